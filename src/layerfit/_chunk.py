@@ -1,0 +1,87 @@
+"""What the shading code is made of: chunks, structs and the guards of its derivatives.
+
+A *chunk* is a function that is traced as one unit, so that the printer can write it as one GLSL function of the same name.
+A *struct* is a dataclass that JAX sees through and the printer writes as a GLSL struct, field by field, with its comments.
+A *guard* is an operation whose value or derivative is infinite at the edge of its domain. Its value is the plain
+operation clamped to the domain, which is what a shader needs; its derivative is the plain one inside the domain and zero on the edge.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, TypeVar, dataclass_transform
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., Any])
+
+CHUNKS: dict[str, Callable[..., Any]] = {}
+"""Every chunk by its name: the printer takes docstrings and annotations from here."""
+
+
+def chunk(fn: F) -> F:
+    """Mark a shading function of scalars, 3-vectors and structs as one printed function (it is `jax.jit` with a name)."""
+    if fn.__name__ in CHUNKS:
+        raise ValueError(f"two chunks are called {fn.__name__}; shader functions need names of their own")
+    CHUNKS[fn.__name__] = fn
+    return jax.jit(fn)  # type: ignore[return-value]
+
+
+def static(default: Any = dataclasses.MISSING, **metadata: Any) -> Any:
+    """A field of a struct that is structure, not a number: it selects code and is never traced."""
+    return dataclasses.field(default=default, metadata={"static": True, **metadata})
+
+
+def member(comment: str) -> Any:
+    """A field of a prepared struct, with the comment that stands beside it in the printed shader."""
+    return dataclasses.field(metadata={"comment": comment})
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(static, member, dataclasses.field))
+def struct(cls: type[T]) -> type[T]:
+    """A frozen dataclass that JAX maps over: fields made by `static` are structure, all others are leaves."""
+    cls = dataclasses.dataclass(frozen=True, eq=False)(cls)
+    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+    meta = [f.name for f in fields if f.metadata.get("static")]
+    return jax.tree_util.register_dataclass(cls, [f.name for f in fields if f.name not in meta], meta)
+
+
+def _tiny(x: jax.Array) -> float:
+    """The smallest number whose reciprocal square root is still harmless in the precision of `x`."""
+    return 1e-14 if x.dtype == np.float32 else 1e-30
+
+
+@jax.custom_jvp
+def safe_sqrt(x: jax.Array) -> jax.Array:
+    """sqrt(max(x, 0)); its derivative is 0 where x <= 0, where the plain one is infinite."""
+    return jnp.sqrt(jnp.maximum(x, 0.0))
+
+
+@safe_sqrt.defjvp
+def _(primals: Any, tangents: Any) -> Any:
+    (x,), (dx,) = primals, tangents
+    root = safe_sqrt(x)
+    inside = x > _tiny(x)
+    return root, jnp.where(inside, 0.5 / jnp.where(inside, root, 1.0), 0.0) * dx
+
+
+@jax.custom_jvp
+def safe_divide(x: jax.Array, y: jax.Array) -> jax.Array:
+    """x / max(y, tiny) for y >= 0; derivative 0 in y where y <= tiny."""
+    return x / jnp.maximum(y, _tiny(y))
+
+
+@safe_divide.defjvp
+def _(primals: Any, tangents: Any) -> Any:
+    (x, y), (dx, dy) = primals, tangents
+    inside = y > _tiny(y)
+    quotient = safe_divide(x, y)
+    inverse = 1.0 / jnp.where(inside, y, 1.0)
+    return quotient, jnp.where(inside, (dx - quotient * dy) * inverse, 0.0)
+
+
+def safe_power(x: jax.Array, exponent: float) -> jax.Array:
+    """x ** exponent for x >= 0 and a constant exponent > 1; value and derivative 0 at and below 0."""
+    return jnp.power(jnp.maximum(x, 1e-30), exponent)

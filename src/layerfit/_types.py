@@ -1,0 +1,12 @@
+"""Array shapes of the shading code, by their names in the field.
+
+Shading functions take scalars and 3-vectors; a batch is always added from outside by `jax.vmap`. A `Colour` is a scalar
+(the same in every channel) or one value a channel: formulas treat the two alike and never mix channels.
+"""
+
+from jaxtyping import Array, Bool, Float
+
+Scalar = Float[Array, ""]
+Flag = Bool[Array, ""]
+Vec3 = Float[Array, "3"]
+Colour = Float[Array, ""] | Float[Array, "3"]

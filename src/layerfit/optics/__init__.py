@@ -1,0 +1,1 @@
+"""Light at one boundary and through one medium: formulas without a material."""

@@ -1,0 +1,80 @@
+"""Fresnel reflectance of a smooth boundary, unpolarised.
+
+`c` is the cosine between the direction and the normal of the facet, on the side of the incident medium, in [0, 1].
+Indices are relative: the medium below divided by the medium above.
+"""
+
+import jax.numpy as jnp
+
+from .._chunk import chunk, safe_divide, safe_sqrt
+from .._types import Colour, Scalar
+
+
+@chunk
+def fresnel_dielectric(c: Scalar, eta: Colour) -> Colour:
+    """Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection."""
+    # (c - g) / (c + g) with g^2 = eta^2 - 1 + c^2 cancels as eta -> 1; -delta / (c + g)^2 is the same and does not.
+    # delta is the product, not eta^2 - 1: in float32 that alone is worth a factor of 300 in error.
+    delta = (eta - 1.0) * (eta + 1.0)
+    g2 = delta + c * c
+    near_tir = 1e-8 if g2.dtype == jnp.float32 else 1e-16
+    refracts = g2 > near_tir
+    g = jnp.sqrt(jnp.where(refracts, g2, 1.0))
+    eta2 = eta * eta
+    perpendicular = (c + g) * (c + g)
+    parallel = (eta2 * c + g) * (eta2 * c + g)
+    rs = -delta / perpendicular
+    rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel
+    reflectance = 0.5 * (rs * rs + rp * rp)
+    return jnp.where(eta == 1.0, 0.0, jnp.where(refracts, reflectance, 1.0))
+
+
+@chunk
+def transmittance_dielectric(c: Scalar, eta: Colour) -> Colour:
+    """1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection."""
+    g = safe_sqrt((eta - 1.0) * (eta + 1.0) + c * c)
+    eta2 = eta * eta
+    perpendicular = c + g
+    parallel = eta2 * c + g
+    product = 2.0 * c * g
+    passed = safe_divide(product, perpendicular * perpendicular) + safe_divide(product * eta2, parallel * parallel)
+    return jnp.where(eta == 1.0, 1.0, passed)
+
+
+@chunk
+def fresnel_conductor(c: Scalar, eta: Colour, k: Colour) -> Colour:
+    """Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2)."""
+    c2 = c * c
+    s2 = (1.0 - c) * (1.0 + c)
+    p = (eta - k) * (eta + k) - s2
+    nk = eta * k
+    q = jnp.sqrt(jnp.maximum(p * p + 4.0 * nk * nk, 1e-24))
+    # a = sqrt((q + p) / 2) cancels where p < 0, as in every metal; there b = sqrt((q - p) / 2) does not and a = nk / b.
+    larger = jnp.sqrt(0.5 * (q + jnp.abs(p)))
+    a = jnp.where(p < 0.0, nk / larger, larger)
+    twice_ac = 2.0 * a * c
+    rs = (q + c2 - twice_ac) / jnp.maximum(q + c2 + twice_ac, 1e-12)
+    s4 = s2 * s2
+    even = q * c2 + s4
+    odd = twice_ac * s2
+    rp = rs * (even - odd) / jnp.maximum(even + odd, 1e-12)
+    return 0.5 * (rs + rp)
+
+
+@chunk
+def fresnel_schlick(c: Scalar, f0: Colour) -> Colour:
+    """Schlick 1994, eq. 15, from the reflectance at normal incidence."""
+    m = 1.0 - c
+    m2 = m * m
+    return f0 + (1.0 - f0) * (m2 * m2 * m)
+
+
+def dielectric_f0(eta: Colour) -> Colour:
+    """Reflectance of a dielectric boundary at normal incidence."""
+    ratio = (eta - 1.0) / (eta + 1.0)
+    return ratio * ratio
+
+
+def conductor_f0(eta: Colour, k: Colour) -> Colour:
+    """Reflectance of a conductor at normal incidence."""
+    return ((eta - 1.0) ** 2 + k * k) / ((eta + 1.0) ** 2 + k * k)

@@ -1,0 +1,30 @@
+"""Light through a medium: refraction into it and absorption along the way.
+
+A refracted direction is reported pointing UP, away from what lies below, so that the layer below is evaluated by the same code.
+"""
+
+import jax.numpy as jnp
+
+from .._chunk import chunk, safe_sqrt
+from .._types import Colour, Scalar, Vec3
+
+
+@chunk
+def refract_about_normal(w: Vec3, eta: Scalar) -> Vec3:
+    """Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection."""
+    # (eta^2 - 1 + z^2) / eta^2 is 1 - (1 - z^2) / eta^2 without the cancellation at grazing angles.
+    z2 = (eta - 1.0) * (eta + 1.0) + w[2] * w[2]
+    return jnp.stack([w[0], w[1], safe_sqrt(z2)]) / eta
+
+
+@chunk
+def refract_about_facet(w: Vec3, h: Vec3, c: Scalar, eta: Scalar) -> Vec3:
+    """Direction below a facet with normal `h`, c = w.h (Elek 2010 after Weidlich and Wilkie 2007); z may be <= 0."""
+    c_below = safe_sqrt((eta - 1.0) * (eta + 1.0) + c * c)
+    return (w + (c_below - c) * h) / eta
+
+
+@chunk
+def transmittance(tau: Colour, path: Scalar) -> Colour:
+    """Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence."""
+    return jnp.exp(-(tau * path))

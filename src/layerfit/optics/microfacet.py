@@ -1,0 +1,157 @@
+"""Microfacet distributions: densities of facet normals, masking, and both in the form that does not overflow.
+
+Directions and half vectors are in the surface frame, normal (0, 0, 1). The width `alpha` is the GGX width or the root mean
+square slope times sqrt(2) (Beckmann): one number, or a pair (alpha_x, alpha_y) for an anisotropic surface.
+
+A reflection lobe is F D G / (4 NoL NoV). D and V = G / (4 NoL NoV) are computed as such: dividing a masking term by
+two cosines loses its value at grazing angles.
+"""
+
+import math
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+
+from .._chunk import chunk, safe_divide, safe_sqrt
+from .._types import Scalar, Vec3
+
+Distribution = Literal["ggx", "beckmann"]
+Masking = Literal["smith", "smith_separable", "vcavity"]
+Width = Scalar | tuple[Scalar, Scalar]
+
+_INV_SQRT_PI = 1.0 / math.sqrt(math.pi)
+
+
+@chunk
+def ggx_d(h: Vec3, alpha: Scalar) -> Scalar:
+    """GGX density of facet normals (Walter et al. 2007, eq. 33)."""
+    # |h.xy|^2 / alpha^2 + h.z^2, never NoH^2 (alpha^2 - 1) + 1: that cancels where alpha is small.
+    e = (h[0] * h[0] + h[1] * h[1]) / (alpha * alpha) + h[2] * h[2]
+    root = 1.0 / (e * alpha)
+    return root * root / jnp.pi
+
+
+@chunk
+def ggx_d_anisotropic(h: Vec3, alpha_x: Scalar, alpha_y: Scalar) -> Scalar:
+    """Anisotropic GGX density of facet normals (Burley 2012, eq. 13)."""
+    x = h[0] / alpha_x
+    y = h[1] / alpha_y
+    e = x * x + y * y + h[2] * h[2]
+    return 1.0 / (jnp.pi * alpha_x * alpha_y * e * e)
+
+
+@chunk
+def beckmann_d(h: Vec3, alpha: Scalar) -> Scalar:
+    """Beckmann density of facet normals (Cook and Torrance 1982, eq. 14, normalised)."""
+    return _beckmann((h[0] * h[0] + h[1] * h[1]) / (alpha * alpha), h[2], alpha * alpha)
+
+
+@chunk
+def beckmann_d_anisotropic(h: Vec3, alpha_x: Scalar, alpha_y: Scalar) -> Scalar:
+    """Anisotropic Beckmann density of facet normals (Heitz 2014, eq. 80)."""
+    x = h[0] / alpha_x
+    y = h[1] / alpha_y
+    return _beckmann(x * x + y * y, h[2], alpha_x * alpha_y)
+
+
+def _beckmann(stretched_xy2: Scalar, z: Scalar, area: Scalar) -> Scalar:
+    # The exponent goes to -infinity at the horizon, where D is 0: the guarded z keeps the derivative finite there.
+    above = z > 1e-4
+    z2 = jnp.where(above, z * z, 1.0)
+    return jnp.where(above, jnp.exp(-stretched_xy2 / z2) / (jnp.pi * area * z2 * z2), 0.0)
+
+
+def density(distribution: Distribution, h: Vec3, alpha: Width) -> Scalar:
+    """D(h) [1/sr], normalised so that the integral of D(h) h.z is 1."""
+    if isinstance(alpha, tuple):
+        anisotropic = ggx_d_anisotropic if distribution == "ggx" else beckmann_d_anisotropic
+        return anisotropic(h, *alpha)
+    return (ggx_d if distribution == "ggx" else beckmann_d)(h, alpha)
+
+
+@chunk
+def ggx_projection(w: Vec3, alpha: Scalar) -> Scalar:
+    """NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out)."""
+    return safe_sqrt(w[2] * w[2] + alpha * alpha * (w[0] * w[0] + w[1] * w[1]))
+
+
+@chunk
+def ggx_projection_anisotropic(w: Vec3, alpha_x: Scalar, alpha_y: Scalar) -> Scalar:
+    """NoW (1 + 2 Lambda) of the anisotropic GGX distribution (Heitz 2014, eqs. 72 and 80)."""
+    x = alpha_x * w[0]
+    y = alpha_y * w[1]
+    return safe_sqrt(w[2] * w[2] + x * x + y * y)
+
+
+@chunk
+def beckmann_projection(w: Vec3, alpha: Scalar) -> Scalar:
+    """NoW (1 + 2 Lambda) of the Beckmann distribution (Heitz 2014, eq. 66, multiplied out)."""
+    return _beckmann_projection(w[2], alpha * alpha * (w[0] * w[0] + w[1] * w[1]))
+
+
+@chunk
+def beckmann_projection_anisotropic(w: Vec3, alpha_x: Scalar, alpha_y: Scalar) -> Scalar:
+    """NoW (1 + 2 Lambda) of the anisotropic Beckmann distribution (Heitz 2014, eqs. 66 and 80)."""
+    x = alpha_x * w[0]
+    y = alpha_y * w[1]
+    return _beckmann_projection(w[2], x * x + y * y)
+
+
+def _beckmann_projection(NoW: Scalar, slope2: Scalar) -> Scalar:
+    # In this form the two terms add: the published one subtracts erfc from its own asymptote.
+    slope = jnp.maximum(safe_sqrt(slope2), 1e-10)
+    q = NoW / slope
+    return NoW * jax.lax.erf(q) + slope * jnp.exp(-q * q) * _INV_SQRT_PI
+
+
+def projection(distribution: Distribution, w: Vec3, alpha: Width) -> Scalar:
+    """NoW (1 + 2 Lambda(w)): twice the projected area of the facets minus that of the plane. Finite at grazing angles."""
+    if isinstance(alpha, tuple):
+        anisotropic = ggx_projection_anisotropic if distribution == "ggx" else beckmann_projection_anisotropic
+        return anisotropic(w, *alpha)
+    return (ggx_projection if distribution == "ggx" else beckmann_projection)(w, alpha)
+
+
+@chunk
+def v_smith(NoL: Scalar, NoV: Scalar, projection_l: Scalar, projection_v: Scalar) -> Scalar:
+    """G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99)."""
+    return safe_divide(0.5, NoV * projection_l + NoL * projection_v)
+
+
+@chunk
+def v_smith_separable(NoL: Scalar, NoV: Scalar, projection_l: Scalar, projection_v: Scalar) -> Scalar:
+    """G / (4 NoL NoV), Smith masking of the two directions taken as independent (Walter et al. 2007, eq. 23)."""
+    return safe_divide(1.0, (NoL + projection_l) * (NoV + projection_v))
+
+
+@chunk
+def v_cavity(wi: Vec3, wo: Vec3) -> Scalar:
+    """G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10)."""
+    s = wi + wo
+    NoH_over_c = 2.0 * s[2] / jnp.maximum(jnp.dot(s, s), 1e-20)
+    return jnp.minimum(safe_divide(0.25, wi[2] * wo[2]), safe_divide(0.5 * NoH_over_c, jnp.maximum(wi[2], wo[2])))
+
+
+def visibility(masking: Masking, distribution: Distribution, wi: Vec3, wo: Vec3, alpha: Width) -> Scalar:
+    """V = G / (4 NoL NoV) [no unit], finite at grazing angles."""
+    if masking == "vcavity":
+        return v_cavity(wi, wo)
+    projection_i = projection(distribution, wi, alpha)
+    projection_o = projection(distribution, wo, alpha)
+    return (v_smith if masking == "smith" else v_smith_separable)(wi[2], wo[2], projection_i, projection_o)
+
+
+@chunk
+def half_vector(wi: Vec3, wo: Vec3) -> Vec3:
+    """The unit vector halfway between two directions on the same side of the surface."""
+    s = wi + wo
+    return s / jnp.sqrt(jnp.maximum(jnp.dot(s, s), 1e-20))
+
+
+@chunk
+def half_cosine(wi: Vec3, wo: Vec3) -> Scalar:
+    """The cosine between either direction and their half vector."""
+    # |wi + wo| / 2: the dot product with the half vector loses it near 0 (grazing, opposite).
+    s = wi + wo
+    return jnp.minimum(0.5 * safe_sqrt(jnp.dot(s, s)), 1.0)

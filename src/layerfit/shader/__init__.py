@@ -1,0 +1,1 @@
+"""From the traced model to a verified shader: print, export, render, compare."""

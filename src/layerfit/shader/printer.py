@@ -1,0 +1,576 @@
+"""Print a traced function as GLSL.
+
+`Printer.function` traces a Python function, walks its jaxpr and writes one GLSL function; each chunk that it calls becomes a
+function of its own, each struct a GLSL struct. Values keep their Python names, formulas their grouping. Only JAX is imported here.
+"""
+
+import dataclasses
+import inspect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+from jax.extend.core import Literal
+
+from .helpers import HELPERS
+from .names import name_of, source_of
+
+PREFIX = "lf_"
+ATOM, UNARY, PRODUCT, SUM, COMPARISON, LOGIC, CHOICE = range(7)
+"""How tightly an expression binds, tightest first."""
+
+_SCALAR_TYPES = {"f": "float", "b": "bool", "i": "int", "u": "uint"}
+_VECTOR_TYPES = {"float": "vec", "bool": "bvec", "int": "ivec", "uint": "uvec"}
+_RESERVED = set(
+    "active asm attribute break buffer case cast centroid class coherent common const continue default discard do double else "
+    "enum extern external filter fixed flat float for goto half highp if image in inline inout input int interface invariant "
+    "layout lowp main mediump namespace noinline noperspective out output packed partition patch precise precision public "
+    "readonly resource restrict return sample sampler shared sizeof smooth static struct subroutine superp switch template "
+    "texture this true false typedef uint uniform union unsigned using varying vec void volatile while writeonly".split()
+)
+
+
+class PrintError(Exception):
+    """A traced function holds something that has no GLSL form."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Value:
+    """A piece of GLSL: its text, its type, how tightly it binds, and the locals that it reads."""
+
+    text: str
+    type: str
+    binds: int = ATOM
+    reads: frozenset[str] = frozenset()
+
+
+@dataclasses.dataclass(frozen=True)
+class StructType:
+    """A GLSL struct: its name and its fields as (name, type, comment)."""
+
+    name: str
+    fields: tuple[tuple[str, str, str], ...]
+
+
+def _base_type(kind: str) -> str:
+    return re.sub(r"\d", "", {"vec": "float", "bvec": "bool", "ivec": "int", "uvec": "uint"}.get(kind[:-1], kind))
+
+
+def glsl_type(aval: Any) -> str:
+    """GLSL type of an abstract value."""
+    scalar = _SCALAR_TYPES[np.dtype(aval.dtype).kind]
+    if aval.shape == ():
+        return scalar
+    if aval.shape in ((2,), (3,), (4,)):
+        return f"{_VECTOR_TYPES[scalar]}{aval.shape[0]}"
+    raise PrintError(f"a value of shape {aval.shape} has no GLSL type: shading code is made of scalars and 3-vectors")
+
+
+def literal(value: Any) -> str:
+    """A constant, in the fewest digits that read back as the same float32."""
+    value = np.asarray(value)
+    if value.ndim:
+        parts = [literal(v) for v in value]
+        kind = glsl_type(value)
+        return f"{kind}({parts[0] if len(set(parts)) == 1 else ', '.join(parts)})"
+    if value.dtype.kind == "b":
+        return "true" if value else "false"
+    if value.dtype.kind == "u":
+        return f"{int(value)}u"
+    if value.dtype.kind == "i":
+        return str(int(value))
+    text = str(np.float32(value))
+    if not np.isfinite(np.float32(value)):
+        raise PrintError(f"{text} has no GLSL literal")
+    return text if "." in text or "e" in text else text + ".0"
+
+
+def indent(text: str) -> str:
+    return "".join(f"    {line}\n" if line else "\n" for line in text.splitlines())
+
+
+class Printer:
+    """Collects the functions and structs of one shader."""
+
+    def __init__(self, chunks: Mapping[str, Callable[..., Any]]):
+        self.chunks = chunks
+        self.functions: dict[Any, tuple[str, str]] = {}
+        self.structs: dict[tuple[Any, ...], StructType] = {}
+        self.helpers: dict[str, str] = {}
+
+    def text(self) -> str:
+        """Structs, helpers and functions, each before its first use."""
+        blocks = [_struct_text(s) for s in self.structs.values()]
+        blocks += self.helpers.values()
+        blocks += [text for _, text in self.functions.values()]
+        return "\n".join(blocks)
+
+    def struct(self, example: Any, leaves: Sequence[tuple[str, str]]) -> StructType:
+        """The GLSL struct of a Python one (an instance or its class), given its leaves as (name, type)."""
+        cls = example if inspect.isclass(example) else type(example)
+        key = (cls.__name__, tuple(leaves))
+        if key not in self.structs:
+            taken = sum(name == cls.__name__ for name, _ in self.structs)
+            comments = {f.name: _comment(f) for f in dataclasses.fields(cls)}
+            fields = tuple((name, kind, comments.get(name, "")) for name, kind in leaves)
+            self.structs[key] = StructType(cls.__name__ + (str(taken + 1) if taken else ""), fields)
+        return self.structs[key]
+
+    def constant(self, name: str, value: Any) -> str:
+        """Declare a struct or a number as a constant, a field a line with its unit and meaning."""
+        leaves = [(key, np.asarray(leaf, np.float32)) for key, leaf in _leaves(value)]
+        if not dataclasses.is_dataclass(value):
+            return f"const {glsl_type(leaves[0][1])} {name} = {literal(leaves[0][1])};\n"
+        struct = self.struct(value, [(key, glsl_type(leaf)) for key, leaf in leaves])
+        rows = [(literal(leaf), f"{key}: {comment}") for (key, leaf), (_, _, comment) in zip(leaves, struct.fields, strict=True)]
+        width = max(len(text) for text, _ in rows) + 1
+        lines = [f"    {text + (',' if k < len(rows) - 1 else ''):<{width}}  // {note}\n" for k, (text, note) in enumerate(rows)]
+        return f"const {struct.name} {name} = {struct.name}(\n{''.join(lines)});\n"
+
+    def function(self, fn: Callable[..., Any], name: str, given: Sequence[tuple[Any, str]], params: Sequence[tuple[Any, str]]) -> str:
+        """Print `fn(*given, *params)` as the GLSL function `name`.
+
+        `given` are pytrees that stand outside the function (constants, uniforms), each with the expression to reach it, its leaves by
+        field; `params` are arrays that become parameters. Returns the text, which `text()` holds too.
+        """
+        trees = [tree for tree, _ in (*given, *params)]
+        closed = jax.make_jaxpr(fn)(*trees)
+        body = _Body(self, closed.jaxpr, closed.consts)
+        names: list[str] = []
+        for tree, text in given:
+            for path, leaf in _leaves(tree):
+                names.append(f"{text}.{path}" if path else text)
+                kind = glsl_type(jax.numpy.asarray(leaf).aval if not hasattr(leaf, "aval") else leaf.aval)
+                body.bind_next(Value(names[-1], kind))
+            if dataclasses.is_dataclass(tree):
+                self.struct(tree, [(path, glsl_type(np.asarray(leaf, np.float32))) for path, leaf in _leaves(tree)])
+        declared = []
+        for array, param in params:
+            declared.append(f"{glsl_type(array)} {param}")
+            body.parameter(param, glsl_type(array))
+            body.bind_next(Value(param, glsl_type(array), reads=frozenset({param})))
+        (result,) = body.run()
+        kind = glsl_type(closed.out_avals[0])
+        doc = _comment_lines(fn)
+        text = f"{doc}{kind} {name}({', '.join(declared)}) {{\n{indent(body.text(_lift(result, kind)))}}}\n"
+        self.functions[name] = (name, text)
+        return text
+
+    def chunk(self, name: str, closed: Any) -> tuple[str, list[tuple[str, str, StructType | None]], StructType | None]:
+        """Print a chunk once; returns its GLSL name, its parameters as (name, type, struct) and the struct that it returns."""
+        jaxpr, fn = closed.jaxpr, self.chunks[name]
+        info = jaxpr.debug_info
+        notes = inspect.get_annotations(fn)
+        groups = _group(info.arg_names, [v.aval for v in jaxpr.invars])
+        params = [
+            (root, leaves[0][1] if leaves[0][0] == "" else "", self.struct(notes[root], leaves) if leaves[0][0] else None)
+            for root, leaves in groups
+        ]
+        returned = None
+        if len(jaxpr.outvars) > 1:
+            ((_, leaves),) = _group(info.result_paths, [v.aval for v in jaxpr.outvars])
+            if not dataclasses.is_dataclass(notes.get("return")):
+                raise PrintError(f"the chunk {name} returns several values: give them a struct, and the function its annotation")
+            returned = self.struct(notes["return"], leaves)
+        body = _Body(self, jaxpr, closed.consts)
+        for (root, kind, struct), (_, leaves) in zip(params, groups, strict=True):
+            root = _safe(root)
+            for (leaf, leaf_kind) in leaves:
+                body.bind_next(Value(f"{root}.{leaf}" if struct else root, leaf_kind, reads=frozenset({root})))
+            body.parameter(root, struct.name if struct else kind)
+        results = [_lift(r, glsl_type(v.aval)) for r, v in zip(body.run(), jaxpr.outvars, strict=True)]
+        kind = returned.name if returned else glsl_type(jaxpr.outvars[0].aval)
+        result = Value(f"{kind}({', '.join(r.text for r in results)})", kind) if returned else results[0]
+        signature = ", ".join(f"{struct.name if struct else kind} {_safe(root)}" for root, kind, struct in params)
+        printed = f"({signature}) {{\n{indent(body.text(result))}}}\n"
+        same_types = (name, tuple(struct.name if struct else kind for _, kind, struct in params))
+        for (key, _), (glsl_name, text) in ((k, v) for k, v in self.functions.items() if isinstance(k, tuple)):
+            if key == same_types and text.endswith(printed):
+                return glsl_name, params, returned
+        # Other parameter types overload the name; the same types with another body (other structure) need a name of their own.
+        variants = sum(isinstance(k, tuple) and k[0] == same_types for k in self.functions)
+        glsl_name = PREFIX + name + (str(variants + 1) if variants else "")
+        text = f"{_comment_lines(fn)}{kind} {glsl_name}{printed}"
+        self.functions[same_types, variants] = (glsl_name, text)
+        return glsl_name, params, returned
+
+
+class _Frame:
+    """The values of one jaxpr while it is printed, and how often each is still needed."""
+
+    def __init__(self, jaxpr: Any, consts: Sequence[Any]):
+        self.values: dict[Any, Value] = {}
+        self.left: dict[Any, int] = {v: 1 for v in jaxpr.outvars if not isinstance(v, Literal)}
+        self.live = []
+        for eqn in reversed(jaxpr.eqns):
+            if any(v in self.left for v in eqn.outvars):
+                self.live.append(eqn)
+                for v in eqn.invars:
+                    if not isinstance(v, Literal):
+                        self.left[v] = self.left.get(v, 0) + 1
+        self.live.reverse()
+        for var, value in zip(jaxpr.constvars, consts, strict=True):
+            self.values[var] = Value(literal(value), glsl_type(var.aval))
+
+    def read(self, var: Any) -> Value:
+        if isinstance(var, Literal):
+            text = literal(var.val)
+            return Value(text, glsl_type(var.aval), UNARY if text.startswith("-") else ATOM)
+        self.left[var] -= 1
+        return self.values[var]
+
+    def needs(self, name: str) -> bool:
+        return any(count > 0 and var in self.values and name in self.values[var].reads for var, count in self.left.items())
+
+
+class _Body:
+    """The statements of one function."""
+
+    def __init__(self, printer: Printer, jaxpr: Any, consts: Sequence[Any]):
+        self.printer = printer
+        self.jaxpr = jaxpr
+        self.lines: list[str] = []
+        self.taken: set[str] = set()
+        self.declared: dict[str, str] = {}
+        self.frames = [_Frame(jaxpr, consts)]
+        self._params = iter(jaxpr.invars)
+
+    def parameter(self, name: str, kind: str) -> None:
+        """A parameter is a local that is already declared: GLSL passes by value."""
+        self.declared[name] = kind
+
+    def bind_next(self, value: Value) -> None:
+        self.frames[0].values[next(self._params)] = value
+
+    def run(self) -> list[Value]:
+        return self._walk(self.frames[0], self.jaxpr, named=True)
+
+    def text(self, result: Value) -> str:
+        return "\n".join([*self.lines, f"return {result.text};"])
+
+    def _walk(self, frame: _Frame, jaxpr: Any, named: bool) -> list[Value]:
+        for eqn in frame.live:
+            operands = [frame.read(v) for v in eqn.invars]
+            name = name_of(eqn) if named else None
+            results = self._translate(eqn, operands, name)
+            if len(results) == 1:
+                (var,) = eqn.outvars
+                value = results[0]
+                simple = re.fullmatch(r"-?[\w.]+", value.text)
+                if not simple and (name or frame.left[var] > 1):
+                    value = self.local(name or "t", value)
+                results = [value]
+            frame.values.update(zip(eqn.outvars, results, strict=True))
+        return [frame.read(v) for v in jaxpr.outvars]
+
+    def local(self, name: str, value: Value) -> Value:
+        """Give a value a name; a name whose old value is no longer read is assigned again."""
+        base = name = _safe(name)
+        k = 2
+        while name in self.taken or (name in self.declared and not self._free(name, value.type)):
+            name, k = f"{base}{k}", k + 1
+        declaration = "" if name in self.declared else f"{value.type} "
+        self.declared[name] = value.type
+        self.lines.append(f"{declaration}{name} = {value.text};")
+        return Value(name, value.type, reads=frozenset({name}))
+
+    def _free(self, name: str, kind: str) -> bool:
+        return self.declared[name] == kind and not any(frame.needs(name) for frame in self.frames)
+
+    def _inline(self, jaxpr: Any, consts: Sequence[Any], operands: Sequence[Value]) -> list[Value]:
+        frame = _Frame(jaxpr, consts)
+        frame.values.update(zip(jaxpr.invars, operands, strict=True))
+        self.frames.append(frame)
+        results = self._walk(frame, jaxpr, named=False)
+        self.frames.pop()
+        return results
+
+    def _translate(self, eqn: Any, operands: list[Value], name: str | None) -> list[Value]:
+        primitive = eqn.primitive.name
+        if primitive in ("jit", "pjit"):
+            closed, called = eqn.params["jaxpr"], eqn.params["name"]
+            if called in self.printer.chunks:
+                return self._call(closed, called, operands, name)
+            return self._inline(closed.jaxpr, closed.consts, operands)
+        if primitive == "custom_jvp_call":
+            closed = eqn.params["call_jaxpr"]
+            return self._inline(closed.jaxpr, closed.consts, operands)
+        if primitive == "scan":
+            return self._loop(eqn, operands)
+        if primitive not in _PRIMITIVES:
+            raise PrintError(f"{source_of(eqn)}: the printer knows no GLSL for the JAX primitive {primitive!r}")
+        try:
+            return [_PRIMITIVES[primitive](self, eqn, *operands)]
+        except PrintError as error:
+            raise PrintError(f"{source_of(eqn)}: {primitive}: {error}") from None
+
+    def _call(self, closed: Any, called: str, operands: list[Value], name: str | None) -> list[Value]:
+        glsl_name, params, returned = self.printer.chunk(called, closed)
+        rest = list(operands)
+        arguments = []
+        for root, kind, struct in params:
+            taken, rest = (rest[: len(struct.fields)], rest[len(struct.fields) :]) if struct else (rest[:1], rest[1:])
+            arguments.append(_whole(taken, struct) if struct else _lift(taken[0], kind))
+        text = f"{glsl_name}({', '.join(a.text for a in arguments)})"
+        reads = frozenset().union(*(a.reads for a in arguments))
+        if returned is None:
+            return [Value(text, glsl_type(closed.out_avals[0]), reads=reads)]
+        whole = self.local(name or returned.name.lower(), Value(text, returned.name, reads=reads))
+        return [Value(f"{whole.text}.{field}", kind, reads=whole.reads) for field, kind, _ in returned.fields]
+
+    def _loop(self, eqn: Any, operands: list[Value]) -> list[Value]:
+        """A scan of fixed length over constant rows of numbers, as a counted loop."""
+        p = eqn.params
+        closed, carries = p["jaxpr"], p["num_carry"]
+        if len(closed.jaxpr.outvars) != carries or p["reverse"]:
+            raise PrintError(f"{source_of(eqn)}: only a forward scan without stacked outputs prints as a loop")
+        outer, carry, rows = (
+            operands[: p["num_consts"]],
+            operands[p["num_consts"] : p["num_consts"] + carries],
+            operands[p["num_consts"] + carries :],
+        )
+        kinds = [glsl_type(v.aval) for v in closed.jaxpr.outvars]
+        state = []
+        for value, kind in zip(carry, kinds, strict=True):
+            lifted = _lift(value, kind)
+            state.append(self.local("total", lifted))
+            self.taken.add(state[-1].text)  # written in the loop: never to be reused for anything else
+        counter = self.local("k", Value("0", "int"))
+        self.lines[-1] = f"for (int {counter.text} = 0; {counter.text} < {p['length']}; ++{counter.text}) {{"
+        self.taken.add(counter.text)
+        start = len(self.lines)
+        known = dict(self.declared)
+        frame = _Frame(closed.jaxpr, closed.consts)
+        items = [Value(f"{row.text}[{counter.text}]", "float", reads=row.reads) for row in rows]
+        frame.values.update(zip(closed.jaxpr.invars, [*outer, *state, *items], strict=True))
+        self.frames.append(frame)
+        results = self._walk(frame, closed.jaxpr, named=True)
+        self.frames.pop()
+        for target, result, kind in zip(state, results, kinds, strict=True):
+            self.lines.append(f"{target.text} = {_lift(result, kind).text};")
+        self.lines[start:] = [f"    {line}" for line in self.lines[start:]] + ["}"]
+        self.declared = known
+        return state
+
+
+def _whole(leaves: Sequence[Value], struct: StructType) -> Value:
+    """The struct that these leaves are all of, or a new one made of them."""
+    reads = frozenset().union(*(v.reads for v in leaves))
+    roots = {v.text.rpartition(".")[0] for v in leaves}
+    root = roots.pop() if len(roots) == 1 else ""
+    if root and all(v.text == f"{root}.{name}" for v, (name, _, _) in zip(leaves, struct.fields, strict=True)):
+        return Value(root, struct.name, reads=reads)
+    lifted = [_lift(v, kind).text for v, (_, kind, _) in zip(leaves, struct.fields, strict=True)]
+    return Value(f"{struct.name}({', '.join(lifted)})", struct.name, reads=reads)
+
+
+def _safe(name: str) -> str:
+    return f"{name}_" if name in _RESERVED or name.startswith("gl_") else name
+
+
+def _lift(value: Value, kind: str) -> Value:
+    """Broadcasts stay scalar until a vector is needed: here it is."""
+    if value.type == kind:
+        return value
+    return Value(f"{kind}({value.text})", kind, reads=value.reads)
+
+
+def _leaves(tree: Any) -> list[tuple[str, Any]]:
+    return [(jax.tree_util.keystr(path, simple=True, separator="."), leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(tree)]
+
+
+def _group(paths: Sequence[str], avals: Sequence[Any]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Leaves such as `coat.alpha`, `coat.eta`, `c` by their argument: coat with two fields, c with none."""
+    groups: list[tuple[str, list[tuple[str, str]]]] = []
+    for path, aval in zip(paths, avals, strict=True):
+        root, _, leaf = path.partition(".")
+        if not groups or groups[-1][0] != root:
+            groups.append((root, []))
+        groups[-1][1].append((leaf, glsl_type(aval)))
+    return groups
+
+
+def _comment(field: dataclasses.Field[Any]) -> str:
+    spec = field.metadata.get("param")
+    if spec is not None:
+        return spec.doc + (f" [{spec.unit}]" if spec.unit != "1" else "")
+    return field.metadata.get("comment", "")
+
+
+def _comment_lines(fn: Callable[..., Any]) -> str:
+    first = (inspect.getdoc(fn) or "").split("\n\n")[0]
+    return "".join(f"// {line}\n" for line in first.splitlines())
+
+
+def _struct_text(struct: StructType) -> str:
+    width = max(len(kind) + len(name) for name, kind, _ in struct.fields) + 2
+    rows = [(f"{kind} {name};", comment) for name, kind, comment in struct.fields]
+    return f"struct {struct.name} {{\n" + "".join(f"    {text:<{width}}  // {note}\n" for text, note in rows) + "};\n"
+
+
+def _bracketed(value: Value, binds: int, right: bool) -> str:
+    loose = value.binds > binds or (right and value.binds in (binds, UNARY))
+    return f"({value.text})" if loose else value.text
+
+
+def _reads(*values: Value) -> frozenset[str]:
+    return frozenset().union(*(v.reads for v in values))
+
+
+def _wider(*values: Value) -> str:
+    return max((v.type for v in values), key=lambda kind: (kind[-1].isdigit(), kind))
+
+
+def _operator(symbol: str, binds: int, neutral: str | None = None, neutral_left: bool = False):
+    def write(body: _Body, eqn: Any, a: Value, b: Value) -> Value:
+        if b.text == neutral:
+            return a
+        if a.text == neutral and neutral_left:
+            return b
+        text = f"{_bracketed(a, binds, False)} {symbol} {_bracketed(b, binds, True)}"
+        return Value(text, _wider(a, b), binds, _reads(a, b))
+
+    return write
+
+
+def _function(name: str, lift: bool = False):
+    def write(body: _Body, eqn: Any, *args: Value) -> Value:
+        kind = _wider(*args)
+        if lift:
+            args = tuple(_lift(a, kind) for a in args)
+        elif len(args) > 1 and not args[0].type == kind:  # max(float, vec3) does not exist; max(vec3, float) does
+            args = (args[1], args[0])
+        return Value(f"{name}({', '.join(a.text for a in args)})", kind, reads=_reads(*args))
+
+    return write
+
+
+def _helper(name: str):
+    def write(body: _Body, eqn: Any, *args: Value) -> Value:
+        body.printer.helpers[name] = HELPERS[name]
+        return Value(f"{PREFIX}{name}({', '.join(a.text for a in args)})", _wider(*args), reads=_reads(*args))
+
+    return write
+
+
+def _comparison(symbol: str, vector_name: str):
+    def write(body: _Body, eqn: Any, a: Value, b: Value) -> Value:
+        kind = _wider(a, b)
+        if not kind[-1].isdigit():
+            text = f"{_bracketed(a, COMPARISON, False)} {symbol} {_bracketed(b, COMPARISON, True)}"
+            return Value(text, "bool", COMPARISON, _reads(a, b))
+        a, b = _lift(a, kind), _lift(b, kind)
+        return Value(f"{vector_name}({a.text}, {b.text})", f"bvec{kind[-1]}", reads=_reads(a, b))
+
+    return write
+
+
+def _select(body: _Body, eqn: Any, which: Value, *cases: Value) -> Value:
+    if len(cases) != 2:
+        raise PrintError("a choice between more than two values")
+    kind = _wider(*cases)
+    if which.type != "bool" and not kind[-1].isdigit():
+        kind = f"vec{which.type[-1]}"
+    no, yes = (_lift(case, kind) for case in cases)
+    if which.type == "bool":
+        parts = [_bracketed(v, CHOICE, True) for v in (which, yes, no)]
+        return Value(f"{parts[0]} ? {parts[1]} : {parts[2]}", kind, CHOICE, _reads(which, no, yes))
+    return Value(f"mix({no.text}, {yes.text}, {which.text})", kind, reads=_reads(which, no, yes))
+
+
+def _passes(body: _Body, eqn: Any, a: Value) -> Value:
+    return a
+
+
+def _convert(body: _Body, eqn: Any, a: Value) -> Value:
+    kind = _SCALAR_TYPES[np.dtype(eqn.params["new_dtype"]).kind]
+    kind = kind if not a.type[-1].isdigit() else f"{_VECTOR_TYPES[kind]}{a.type[-1]}"
+    return a if kind == a.type else Value(f"{kind}({a.text})", kind, reads=a.reads)
+
+
+def _negate(body: _Body, eqn: Any, a: Value) -> Value:
+    return Value(f"-{_bracketed(a, UNARY, True)}", a.type, UNARY, a.reads)
+
+
+def _slice(body: _Body, eqn: Any, a: Value) -> Value:
+    start, limit = eqn.params["start_indices"][0], eqn.params["limit_indices"][0]
+    if not a.type[-1].isdigit():
+        return a
+    size = limit - start
+    kind = _base_type(a.type) if size == 1 else f"{a.type[:-1]}{size}"
+    return Value(f"{_bracketed(a, ATOM, False)}.{'xyzw'[start:limit]}", kind, reads=a.reads)
+
+
+def _build(body: _Body, eqn: Any, *parts: Value) -> Value:
+    kind = glsl_type(eqn.outvars[0].aval)
+    return Value(f"{kind}({', '.join(p.text for p in parts)})", kind, reads=_reads(*parts))
+
+
+def _sum(body: _Body, eqn: Any, a: Value) -> Value:
+    size = eqn.invars[0].aval.shape[0]
+    kind = f"vec{size}"
+    return Value(f"dot({_lift(a, kind).text}, {kind}(1.0))", "float", reads=a.reads)
+
+
+def _dot(body: _Body, eqn: Any, a: Value, b: Value) -> Value:
+    if eqn.params["dimension_numbers"] != (((0,), (0,)), ((), ())):
+        raise PrintError("only the dot product of two vectors has a GLSL form")
+    kind = glsl_type(eqn.invars[0].aval)
+    return Value(f"dot({_lift(a, kind).text}, {_lift(b, kind).text})", "float", reads=_reads(a, b))
+
+
+def _integer_power(body: _Body, eqn: Any, a: Value) -> Value:
+    y = eqn.params.get("y", 2)
+    if not re.fullmatch(r"[\w.]+", a.text):
+        a = body.local("t", a)
+    product = " * ".join([a.text] * abs(y))
+    if y < 0:
+        return Value(f"1.0 / ({product})" if y < -1 else f"1.0 / {product}", a.type, PRODUCT, a.reads)
+    return Value(product, a.type, PRODUCT if y > 1 else ATOM, a.reads)
+
+
+def _clamp(body: _Body, eqn: Any, low: Value, x: Value, high: Value) -> Value:
+    kind = _wider(low, x, high)
+    low, x, high = (_lift(v, kind) for v in (low, x, high))
+    return Value(f"clamp({x.text}, {low.text}, {high.text})", kind, reads=_reads(low, x, high))
+
+
+_PRIMITIVES: dict[str, Callable[..., Value]] = {
+    "add": _operator("+", SUM, "0.0", neutral_left=True),
+    "sub": _operator("-", SUM, "0.0"),
+    "mul": _operator("*", PRODUCT, "1.0", neutral_left=True),
+    "div": _operator("/", PRODUCT, "1.0"),
+    "neg": _negate,
+    "max": _function("max"),
+    "min": _function("min"),
+    "pow": _function("pow", lift=True),
+    **{name: _function(name) for name in ("exp", "exp2", "log", "sqrt", "sin", "cos", "tan", "tanh", "abs", "sign", "floor", "ceil")},
+    "rsqrt": _function("inversesqrt"),
+    **{name: _helper(name) for name in ("erf", "expm1", "log1p", "atan2")},
+    "integer_pow": _integer_power,
+    "square": _integer_power,
+    "clamp": _clamp,
+    "gt": _comparison(">", "greaterThan"),
+    "ge": _comparison(">=", "greaterThanEqual"),
+    "lt": _comparison("<", "lessThan"),
+    "le": _comparison("<=", "lessThanEqual"),
+    "eq": _comparison("==", "equal"),
+    "ne": _comparison("!=", "notEqual"),
+    "and": _operator("&&", LOGIC),
+    "or": _operator("||", LOGIC),
+    "not": lambda body, eqn, a: Value(f"!{_bracketed(a, UNARY, True)}", a.type, UNARY, a.reads),
+    "select_n": _select,
+    "broadcast_in_dim": _passes,
+    "reshape": _passes,
+    "squeeze": _passes,
+    "copy": _passes,
+    "stop_gradient": _passes,
+    "convert_element_type": _convert,
+    "slice": _slice,
+    "concatenate": _build,
+    "stack": _build,
+    "reduce_sum": _sum,
+    "dot_general": _dot,
+}

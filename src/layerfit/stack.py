@@ -1,0 +1,50 @@
+"""A layered material: coats over a base, and the form in which the light between them is computed."""
+
+from dataclasses import replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from ._chunk import static, struct
+from ._types import Colour, Vec3
+from .forms import corrected, faithful
+from .layers import Coat
+
+Form = faithful.Faithful | corrected.Corrected
+FORMS = {faithful.Faithful: faithful, corrected.Corrected: corrected}
+
+
+@struct
+class Stack:
+    """Layers over a base, outermost first. What a material does without is absent: no coat, no absorption."""
+
+    layers: tuple[Coat, ...]
+    base: Any
+    form: Form = static(corrected.Corrected())
+
+    def astype(self, dtype: Any) -> "Stack":
+        """The same material with every number in one precision."""
+        return jax.tree.map(lambda x: jnp.asarray(x, dtype), self)
+
+    def prepare(self) -> Any:
+        """What is computed once per material: the constants of its shader."""
+        if not self.layers:
+            return self.base
+        return FORMS[type(self.form)].prepare(self.layers, self.base, self.form)
+
+    def without(self, name: str) -> "Stack":
+        """The same material with one layer taken off."""
+        left = tuple(layer for layer in self.layers if layer.name != name)
+        if len(left) == len(self.layers):
+            raise KeyError(f"no layer called {name!r} to take off; there are {[layer.name for layer in self.layers]}")
+        return replace(self, layers=left)
+
+
+def evaluate(form: Form, prepared: Any, wi: Vec3, wo: Vec3) -> Colour:
+    """BRDF [1/sr] of a prepared material for unit directions in the surface frame; 0 below the surface."""
+    if isinstance(prepared, (faithful.Prepared, corrected.Prepared)):
+        return FORMS[type(form)].evaluate(prepared, wi, wo, form)
+    lit = (wi[2] > 0.0) & (wo[2] > 0.0)
+    up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
+    return jnp.where(lit, prepared.evaluate(jnp.where(lit, wi, up), jnp.where(lit, wo, up)), 0.0)

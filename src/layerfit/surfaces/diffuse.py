@@ -1,0 +1,88 @@
+"""Diffuse boundaries: light that has lost its direction below the surface."""
+
+from typing import Self
+
+import jax.numpy as jnp
+
+from .._chunk import chunk, safe_divide, safe_sqrt, static
+from .._fields import choice, layer, param
+from .._types import Colour, Scalar, Vec3
+
+
+def _albedo() -> Colour:
+    return param(0.5, 0.0, 1.0, "linear", "part of the light that is sent back", colour=True)
+
+
+@layer
+class Lambert:
+    """An ideally diffuse boundary: the same radiance in every direction (Lambert 1760)."""
+
+    name: str = static("base", doc="name of the layer")
+    albedo: Colour = _albedo()
+
+    def below(self, n: Scalar) -> Self:
+        """The same boundary: a medium above does not change it."""
+        return self
+
+    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+        """BRDF [1/sr]."""
+        return self.albedo / jnp.pi
+
+
+@chunk
+def oren_nayar_qualitative(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour:
+    """Oren and Nayar 1994, eq. 30: diffuse grooves, first order."""
+    sigma2 = sigma * sigma
+    A = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33)
+    B = 0.45 * sigma2 / (sigma2 + 0.09)
+    # cos(phi) sin(larger) tan(smaller) is a dot product over the larger cosine: no angles, no 0 / 0.
+    dot_xy = wi[0] * wo[0] + wi[1] * wo[1]
+    return albedo / jnp.pi * (A + B * jnp.maximum(dot_xy, 0.0) / jnp.maximum(wi[2], wo[2]))
+
+
+@chunk
+def oren_nayar_full(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour:
+    """Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection."""
+    sigma2 = sigma * sigma
+    c1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33)
+    c2 = 0.45 * sigma2 / (sigma2 + 0.09)
+    c3 = 0.125 * sigma2 / (sigma2 + 0.09)
+    c4 = 0.17 * sigma2 / (sigma2 + 0.13)
+    sin_i = safe_sqrt(wi[0] * wi[0] + wi[1] * wi[1])
+    sin_o = safe_sqrt(wo[0] * wo[0] + wo[1] * wo[1])
+    theta_i = jnp.arctan2(sin_i, wi[2])
+    theta_o = jnp.arctan2(sin_o, wo[2])
+    larger = jnp.maximum(theta_i, theta_o) * (2.0 / jnp.pi)
+    smaller = jnp.minimum(theta_i, theta_o) * (2.0 / jnp.pi)
+    dot_xy = wi[0] * wo[0] + wi[1] * wo[1]
+    cos_phi = safe_divide(dot_xy, sin_i * sin_o)
+    # tan of the smaller angle has the larger cosine below it; tan of the mean angle is (sin + sin) / (cos + cos).
+    larger_cos = jnp.maximum(wi[2], wo[2])
+    forward = dot_xy / larger_cos
+    cubed = smaller * smaller * smaller
+    backward = forward - safe_divide(dot_xy * cubed, larger_cos * jnp.maximum(sin_i, sin_o))
+    tan_mean = (sin_i + sin_o) / (wi[2] + wo[2])
+    product = larger * smaller
+    direct = c1 + c2 * jnp.where(dot_xy >= 0.0, forward, backward)
+    direct = direct + (1.0 - jnp.abs(cos_phi)) * c3 * (product * product) * tan_mean
+    interreflected = c4 * (1.0 - cos_phi * (smaller * smaller))
+    return albedo / jnp.pi * (direct + albedo * interreflected)
+
+
+@layer
+class OrenNayar:
+    """A rough diffuse boundary: V-grooves of Lambertian facets (Oren and Nayar 1994)."""
+
+    name: str = static("base", doc="name of the layer")
+    albedo: Colour = _albedo()
+    sigma: Scalar = param(0.3, 0.0, 1.2, "softlog", "standard deviation of the facet angle", unit="rad", soft=0.1)
+    form: str = choice("full", "qualitative", doc="with one interreflection, or the short form")
+
+    def below(self, n: Scalar) -> Self:
+        """The same boundary: a medium above does not change it."""
+        return self
+
+    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+        """BRDF [1/sr]."""
+        chosen = oren_nayar_full if self.form == "full" else oren_nayar_qualitative
+        return chosen(wi, wo, self.albedo, self.sigma)

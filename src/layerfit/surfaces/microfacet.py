@@ -1,0 +1,99 @@
+"""Rough boundaries made of microfacets: metal and dielectric."""
+
+from dataclasses import replace
+from typing import Self
+
+from .._chunk import static
+from .._fields import choice, layer, param
+from .._types import Colour, Scalar, Vec3
+from ..optics.fresnel import conductor_f0, dielectric_f0, fresnel_conductor, fresnel_dielectric
+from ..optics.microfacet import Width, density, half_cosine, half_vector, visibility
+
+
+class Microfacets:
+    """A boundary whose facets have a width: one `alpha`, or `alpha_x` along the tangent and `alpha_y` across it."""
+
+    alpha: Scalar | None
+    alpha_x: Scalar | None
+    alpha_y: Scalar | None
+    distribution: str
+    masking: str
+
+    @property
+    def width(self) -> Width:
+        return self.alpha if self.alpha_x is None else (self.alpha_x, self.alpha_y)
+
+    def fresnel(self, c: Scalar) -> Colour:
+        """Reflectance of one facet at the cosine `c`."""
+        raise NotImplementedError
+
+    def density(self, h: Vec3, width: Width | None = None) -> Scalar:
+        """D(h) [1/sr] of these facets, or of wider ones."""
+        return density(self.distribution, h, self.width if width is None else width)
+
+    def visibility(self, wi: Vec3, wo: Vec3, width: Width | None = None) -> Scalar:
+        """G / (4 NoL NoV) of these facets, or of wider ones."""
+        return visibility(self.masking, self.distribution, wi, wo, self.width if width is None else width)
+
+    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+        """BRDF [1/sr] of directions above the surface (Cook and Torrance 1982; Walter et al. 2007, eq. 20)."""
+        F = self.fresnel(half_cosine(wi, wo))
+        D = self.density(half_vector(wi, wo))
+        V = self.visibility(wi, wo)
+        return F * D * V
+
+
+def alpha_param(default: float | None, which: str) -> float | None:
+    return param(default, 1e-3, 1.0, "log", f"width of the facet slopes{which}; the square of an artist's roughness")
+
+
+@layer
+class Conductor(Microfacets):
+    """A metal: complex index of refraction, rough.
+
+    `eta` and `k` are absolute (against air); a coat above divides them by its own index.
+    """
+
+    name: str = static("base", doc="name of the layer")
+    alpha: Scalar | None = alpha_param(0.2, "")
+    alpha_x: Scalar | None = alpha_param(None, " along the tangent")
+    alpha_y: Scalar | None = alpha_param(None, " across the tangent")
+    eta: Colour = param(0.2, 0.02, 10.0, "log", "index of refraction, real part", colour=True, fitted=False)
+    k: Colour = param(3.5, 0.0, 15.0, "softlog", "index of refraction, imaginary part", colour=True, fitted=False)
+    distribution: str = choice("ggx", "beckmann", doc="density of the facet normals")
+    masking: str = choice("smith", "smith_separable", "vcavity", doc="how facets hide one another")
+
+    def below(self, n: Scalar) -> Self:
+        """The same metal under a medium of index `n`."""
+        return replace(self, eta=self.eta / n, k=self.k / n)
+
+    def fresnel(self, c: Scalar) -> Colour:
+        return fresnel_conductor(c, self.eta, self.k)
+
+    @property
+    def f0(self) -> Colour:
+        return conductor_f0(self.eta, self.k)
+
+
+@layer
+class Dielectric(Microfacets):
+    """A rough boundary to a clear or black medium of real index; what passes it is lost."""
+
+    name: str = static("base", doc="name of the layer")
+    alpha: Scalar | None = alpha_param(0.2, "")
+    alpha_x: Scalar | None = alpha_param(None, " along the tangent")
+    alpha_y: Scalar | None = alpha_param(None, " across the tangent")
+    eta: Colour = param(1.5, 1.0, 4.0, "linear", "index of refraction", colour=True)
+    distribution: str = choice("ggx", "beckmann", doc="density of the facet normals")
+    masking: str = choice("smith", "smith_separable", "vcavity", doc="how facets hide one another")
+
+    def below(self, n: Scalar) -> Self:
+        """The same medium under one of index `n`."""
+        return replace(self, eta=self.eta / n)
+
+    def fresnel(self, c: Scalar) -> Colour:
+        return fresnel_dielectric(c, self.eta)
+
+    @property
+    def f0(self) -> Colour:
+        return dielectric_f0(self.eta)
