@@ -50,21 +50,26 @@ def oren_nayar_full(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour
     c4 = 0.17 * sigma2 / (sigma2 + 0.13)
     sin_i = safe_sqrt(wi[0] * wi[0] + wi[1] * wi[1])
     sin_o = safe_sqrt(wo[0] * wo[0] + wo[1] * wo[1])
-    theta_i = jnp.arctan2(sin_i, wi[2])
-    theta_o = jnp.arctan2(sin_o, wo[2])
-    larger = jnp.maximum(theta_i, theta_o) * (2.0 / jnp.pi)
-    smaller = jnp.minimum(theta_i, theta_o) * (2.0 / jnp.pi)
+    # Elevations rather than polar angles, and 1 - cos rather than cos: near grazing, differences of ones stand over small cosines.
+    elevation_i = jnp.arctan2(wi[2], sin_i) * (2.0 / jnp.pi)
+    elevation_o = jnp.arctan2(wo[2], sin_o) * (2.0 / jnp.pi)
+    higher = jnp.maximum(elevation_i, elevation_o)
+    lower_cos = jnp.minimum(wi[2], wo[2])
+    larger_cos = jnp.maximum(wi[2], wo[2])
+    larger_sin = jnp.maximum(sin_i, sin_o)
     dot_xy = wi[0] * wo[0] + wi[1] * wo[1]
     cos_phi = safe_divide(dot_xy, sin_i * sin_o)
-    # tan of the smaller angle has the larger cosine below it; tan of the mean angle is (sin + sin) / (cos + cos).
-    larger_cos = jnp.maximum(wi[2], wo[2])
+    sin_phi = safe_divide(wi[0] * wo[1] - wi[1] * wo[0], sin_i * sin_o)
+    aside = sin_phi * sin_phi / (1.0 + jnp.abs(cos_phi))  # 1 - |cos phi|
+    # tan of the smaller polar angle has the larger cosine below it; tan of the mean angle is (sin + sin) / (cos + cos).
     forward = dot_xy / larger_cos
-    cubed = smaller * smaller * smaller
-    backward = forward - safe_divide(dot_xy * cubed, larger_cos * jnp.maximum(sin_i, sin_o))
+    gap = higher * (3.0 - higher * (3.0 - higher)) - lower_cos * lower_cos / (1.0 + larger_sin)
+    backward = safe_divide(dot_xy * gap, larger_cos * larger_sin)
     tan_mean = (sin_i + sin_o) / (wi[2] + wo[2])
-    product = larger * smaller
+    smaller = 1.0 - higher
+    product = smaller * (1.0 - jnp.minimum(elevation_i, elevation_o))
     direct = c1 + c2 * jnp.where(dot_xy >= 0.0, forward, backward)
-    direct = direct + (1.0 - jnp.abs(cos_phi)) * c3 * (product * product) * tan_mean
+    direct = direct + aside * c3 * (product * product) * tan_mean
     interreflected = c4 * (1.0 - cos_phi * (smaller * smaller))
     return albedo / jnp.pi * (direct + albedo * interreflected)
 
