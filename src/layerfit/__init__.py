@@ -1,1 +1,3 @@
 """layerfit."""
+
+__version__ = "0.1.0"

@@ -337,6 +337,7 @@ def _nodes(dtype: np.dtype) -> tuple[np.ndarray, np.ndarray]:
     return (0.5 * (x + 1.0)).astype(dtype), (0.5 * w).astype(dtype)
 
 
+@jax.jit  # not for speed: outside of a trace, a scan over a new function would compile again at every call
 def _escape(coats: list[Coat], interfaces: list[Interface]) -> Colour:
     """Part of the light of a diffuse base that gets out at its first try: 2 int (1 - R exp(-2 tau / mu)) mu dmu."""
     n = interfaces[-1].n

@@ -29,7 +29,7 @@ class Coat(Microfacets):
     absorption_per_mm: Colour | None = param(
         None, 0.0, 1e4, "softlog", "absorption coefficient", unit="1/mm", colour=True, soft=1.0
     )
-    thickness_um: Scalar | None = param(None, 0.1, 5e3, "log", "thickness", unit="um")
+    thickness_um: Scalar | None = param(None, 0.1, 5e3, "log", "thickness", unit="um", fitted=False)
     distribution: str = choice("ggx", "beckmann", doc="density of the facet normals")
     masking: str = choice("smith", "smith_separable", "vcavity", doc="how facets hide one another")
 

@@ -99,13 +99,23 @@ class Printer:
         self.functions: dict[Any, tuple[str, str]] = {}
         self.structs: dict[tuple[Any, ...], StructType] = {}
         self.helpers: dict[str, str] = {}
+        self.arrays: dict[str, str] = {}
 
-    def text(self) -> str:
-        """Structs, helpers and functions, each before its first use."""
-        blocks = [_struct_text(s) for s in self.structs.values()]
-        blocks += self.helpers.values()
-        blocks += [text for _, text in self.functions.values()]
-        return "\n".join(blocks)
+    def structs_text(self) -> str:
+        """Declarations of the structs."""
+        return "\n".join(_struct_text(s) for s in self.structs.values())
+
+    def functions_text(self) -> str:
+        """Tables, helpers and functions, each before its first use."""
+        return "\n".join([*self.arrays.values(), *self.helpers.values(), *(text for _, text in self.functions.values())])
+
+    def array(self, value: np.ndarray) -> str:
+        """Declare a row of numbers as a constant; returns its name."""
+        rows = ", ".join(literal(v) for v in value)
+        key = f"float[{len(value)}]({rows})"
+        if key not in self.arrays:
+            self.arrays[key] = f"const float {PREFIX}row{len(self.arrays) + 1}[{len(value)}] = {key};\n"
+        return self.arrays[key].split("[")[0].split()[-1]
 
     def struct(self, example: Any, leaves: Sequence[tuple[str, str]]) -> StructType:
         """The GLSL struct of a Python one (an instance or its class), given its leaves as (name, type)."""
@@ -129,11 +139,11 @@ class Printer:
         lines = [f"    {text + (',' if k < len(rows) - 1 else ''):<{width}}  // {note}\n" for k, (text, note) in enumerate(rows)]
         return f"const {struct.name} {name} = {struct.name}(\n{''.join(lines)});\n"
 
-    def function(self, fn: Callable[..., Any], name: str, given: Sequence[tuple[Any, str]], params: Sequence[tuple[Any, str]]) -> str:
+    def function(self, fn: Callable[..., Any], name: str, given: Sequence[tuple[Any, str]], params: Sequence[tuple[Any, str]]) -> None:
         """Print `fn(*given, *params)` as the GLSL function `name`.
 
         `given` are pytrees that stand outside the function (constants, uniforms), each with the expression to reach it, its leaves by
-        field; `params` are arrays that become parameters. Returns the text, which `text()` holds too.
+        field; `params` are arrays that become parameters.
         """
         trees = [tree for tree, _ in (*given, *params)]
         closed = jax.make_jaxpr(fn)(*trees)
@@ -156,7 +166,6 @@ class Printer:
         doc = _comment_lines(fn)
         text = f"{doc}{kind} {name}({', '.join(declared)}) {{\n{indent(body.text(_lift(result, kind)))}}}\n"
         self.functions[name] = (name, text)
-        return text
 
     def chunk(self, name: str, closed: Any) -> tuple[str, list[tuple[str, str, StructType | None]], StructType | None]:
         """Print a chunk once; returns its GLSL name, its parameters as (name, type, struct) and the struct that it returns."""
@@ -200,7 +209,7 @@ class Printer:
 class _Frame:
     """The values of one jaxpr while it is printed, and how often each is still needed."""
 
-    def __init__(self, jaxpr: Any, consts: Sequence[Any]):
+    def __init__(self, printer: Printer, jaxpr: Any, consts: Sequence[Any]):
         self.values: dict[Any, Value] = {}
         self.left: dict[Any, int] = {v: 1 for v in jaxpr.outvars if not isinstance(v, Literal)}
         self.live = []
@@ -212,7 +221,8 @@ class _Frame:
                         self.left[v] = self.left.get(v, 0) + 1
         self.live.reverse()
         for var, value in zip(jaxpr.constvars, consts, strict=True):
-            self.values[var] = Value(literal(value), glsl_type(var.aval))
+            row = var.aval.ndim == 1 and var.aval.size > 4
+            self.values[var] = Value(printer.array(np.asarray(value)), "row") if row else Value(literal(value), glsl_type(var.aval))
 
     def read(self, var: Any) -> Value:
         if isinstance(var, Literal):
@@ -234,7 +244,7 @@ class _Body:
         self.lines: list[str] = []
         self.taken: set[str] = set()
         self.declared: dict[str, str] = {}
-        self.frames = [_Frame(jaxpr, consts)]
+        self.frames = [_Frame(printer, jaxpr, consts)]
         self._params = iter(jaxpr.invars)
 
     def parameter(self, name: str, kind: str) -> None:
@@ -280,7 +290,7 @@ class _Body:
         return self.declared[name] == kind and not any(frame.needs(name) for frame in self.frames)
 
     def _inline(self, jaxpr: Any, consts: Sequence[Any], operands: Sequence[Value]) -> list[Value]:
-        frame = _Frame(jaxpr, consts)
+        frame = _Frame(self.printer, jaxpr, consts)
         frame.values.update(zip(jaxpr.invars, operands, strict=True))
         self.frames.append(frame)
         results = self._walk(frame, jaxpr, named=False)
@@ -342,7 +352,7 @@ class _Body:
         self.taken.add(counter.text)
         start = len(self.lines)
         known = dict(self.declared)
-        frame = _Frame(closed.jaxpr, closed.consts)
+        frame = _Frame(self.printer, closed.jaxpr, closed.consts)
         items = [Value(f"{row.text}[{counter.text}]", "float", reads=row.reads) for row in rows]
         frame.values.update(zip(closed.jaxpr.invars, [*outer, *state, *items], strict=True))
         self.frames.append(frame)

@@ -1,0 +1,45 @@
+//@ header
+//@ about
+//
+// vec3 lf_brdf(@FRAME@) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
+// the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
+// Define LF_LIBRARY to take the functions without the entry point below.
+
+//@ material
+#ifndef LF_LIBRARY
+
+#ifndef LF_LIGHTS
+#define LF_LIGHTS 1
+#endif
+
+in vec3 v_position;
+in vec3 v_normal;
+//@ if anisotropic
+in vec3 v_tangent;
+//@ end
+out vec4 color;
+
+uniform vec3 u_eye;
+// A light's direction (w = 0) or position (w = 1), and its irradiance or its intensity per steradian.
+uniform vec4 u_light[LF_LIGHTS];
+uniform vec3 u_light_rgb[LF_LIGHTS];
+
+//@ lights
+//@ output
+void main() {
+    vec3 n = normalize(v_normal);
+    vec3 v = normalize(u_eye - v_position);
+    vec3 radiance = vec3(0.0);
+    for (int k = 0; k < LF_LIGHTS; ++k) {
+        vec3 l;
+        vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
+//@ if anisotropic
+        radiance += lf_brdf(n, v_tangent, v, l) * irradiance * max(dot(n, l), 0.0);
+//@ else
+        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+//@ end
+    }
+    color = vec4(lf_output(radiance), 1.0);
+}
+
+#endif

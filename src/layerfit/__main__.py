@@ -1,0 +1,5 @@
+"""`python -m layerfit`."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,1 @@
+"""What a reference is: reading renders, resolving their channels and checking them."""

@@ -1,0 +1,230 @@
+"""Lights as directions and weights: what each pixel receives, per unit of BRDF.
+
+A pixel is the sum over samples of f(wi, wo) times weight. Directional and point lights are one sample each, exact. Constant,
+spherical and environment light is a quadrature: directions drawn for each pixel from a mixture of a cosine lobe, half vectors of
+three widths and (spheres, maps) the light itself, weighted by the balance heuristic (Veach and Guibas 1995).
+"""
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ..errors import InputError
+from .exr import read_exr
+from .geometry import frames, normalise
+from .scene import Constant, Directional, EnvironmentMap, Light, Point, SphereLight
+
+HALF_VECTOR_WIDTHS = (0.06, 0.18, 0.5)
+"""GGX widths of the half vectors: between them they follow lobes from a polished coat to a rough base."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Received:
+    """Light at n points: unit directions to it and weights (radiance per unit of BRDF), each (n, samples, 3), world frame."""
+
+    to_light: np.ndarray
+    weight: np.ndarray
+
+
+def is_exact(light: Light) -> bool:
+    """Whether one sample is all there is to it."""
+    return isinstance(light, (Directional, Point))
+
+
+def receive(
+    lights: tuple[Light, ...], position: np.ndarray, normal: np.ndarray, view: np.ndarray, samples: int, seed: int
+) -> Received:
+    """Light at points (n, 3): one sample for each exact light, and `samples` for each of the others."""
+    rng = np.random.default_rng(seed)
+    parts = [
+        _exact(light, position, normal) if is_exact(light) else _quadrature(light, position, normal, view, samples, rng)
+        for light in lights
+    ]
+    return Received(np.concatenate([p.to_light for p in parts], 1), np.concatenate([p.weight for p in parts], 1))
+
+
+def _exact(light: Directional | Point, position: np.ndarray, normal: np.ndarray) -> Received:
+    if isinstance(light, Directional):
+        to_light = np.broadcast_to(light.to_light, position.shape)
+        intensity = np.broadcast_to(light.irradiance_rgb, position.shape)
+    else:
+        away = np.subtract(light.position, position)
+        distance2 = np.sum(away * away, -1, keepdims=True)
+        to_light = away / np.sqrt(distance2)
+        intensity = np.asarray(light.intensity_rgb) / distance2
+    cosine = np.maximum(np.sum(normal * to_light, -1, keepdims=True), 0.0)
+    return Received(to_light[:, None], (intensity * cosine)[:, None])
+
+
+def _quadrature(
+    light: Constant | SphereLight | EnvironmentMap,
+    position: np.ndarray,
+    normal: np.ndarray,
+    view: np.ndarray,
+    samples: int,
+    rng: np.random.Generator,
+) -> Received:
+    n = len(position)
+    strategies = 1 + len(HALF_VECTOR_WIDTHS) + (not isinstance(light, Constant))
+    each = max(1, samples // strategies)
+    to_surface = frames(normal, None)
+    wo = np.einsum("nij,nj->ni", to_surface, view)
+    drawn = [_cosine_lobe(_points(n, each, rng))]
+    for alpha in HALF_VECTOR_WIDTHS:
+        h = _ggx_normals(_points(n, each, rng), alpha)
+        drawn.append(2.0 * np.sum(h * wo[:, None], -1, keepdims=True) * h - wo[:, None])
+    directions = [np.einsum("nji,nsj->nsi", to_surface, w) for w in drawn]
+    own = None
+    if isinstance(light, SphereLight):
+        own = _SphereSampler(light, position)
+    elif isinstance(light, EnvironmentMap):
+        own = _map_sampler(light)
+    if own:
+        directions.append(own.draw(_points(n, each, rng)))
+    to_light = np.concatenate(directions, 1)
+    wi = np.einsum("nij,nsj->nsi", to_surface, to_light)
+    mixture = _cosine_pdf(wi) + sum(_ggx_pdf(wi, wo, alpha) for alpha in HALF_VECTOR_WIDTHS)
+    if own:
+        mixture = mixture + own.pdf(to_light)
+    cosine = wi[..., 2]
+    radiance = _radiance(light, position, to_light)
+    scale = np.where((cosine > 0.0) & (mixture > 0.0), cosine / np.where(mixture > 0.0, mixture * each, 1.0), 0.0)
+    return Received(to_light, radiance * scale[..., None])
+
+
+def _points(n: int, count: int, rng: np.random.Generator) -> np.ndarray:
+    """The R2 sequence (Roberts 2018) of `count` points in the unit square, shifted at random for each of n pixels."""
+    g = 1.32471795724474602596
+    base = (0.5 + np.arange(1, count + 1)[:, None] * np.array([1.0 / g, 1.0 / g**2])) % 1.0
+    return (base[None] + rng.random((n, 1, 2))) % 1.0
+
+
+def _cosine_lobe(u: np.ndarray) -> np.ndarray:
+    r, phi = np.sqrt(u[..., 0]), 2.0 * np.pi * u[..., 1]
+    return np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1.0 - u[..., 0])], -1)
+
+
+def _cosine_pdf(w: np.ndarray) -> np.ndarray:
+    return np.maximum(w[..., 2], 0.0) / np.pi
+
+
+def _ggx_normals(u: np.ndarray, alpha: float) -> np.ndarray:
+    """Normals with density D h.z (Walter et al. 2007, eqs. 35 and 36)."""
+    tan2 = alpha * alpha * u[..., 0] / (1.0 - u[..., 0])
+    z = 1.0 / np.sqrt(1.0 + tan2)
+    r, phi = np.sqrt(np.maximum(1.0 - z * z, 0.0)), 2.0 * np.pi * u[..., 1]
+    return np.stack([r * np.cos(phi), r * np.sin(phi), z], -1)
+
+
+def _ggx_pdf(wi: np.ndarray, wo: np.ndarray, alpha: float) -> np.ndarray:
+    """Density of directions reflected at such normals."""
+    h = normalise(wi + wo[:, None])
+    c = np.sum(h * wo[:, None], -1)
+    e = (h[..., 0] ** 2 + h[..., 1] ** 2) / alpha**2 + h[..., 2] ** 2
+    D = 1.0 / (np.pi * alpha**2 * np.maximum(e, 1e-30) ** 2)
+    return np.where((c > 0.0) & (h[..., 2] > 0.0), D * h[..., 2] / (4.0 * np.maximum(c, 1e-9)), 0.0)
+
+
+def _radiance(light: Constant | SphereLight | EnvironmentMap, position: np.ndarray, to_light: np.ndarray) -> np.ndarray:
+    if isinstance(light, Constant):
+        return np.broadcast_to(light.radiance_rgb, to_light.shape)
+    if isinstance(light, SphereLight):
+        sampler = _SphereSampler(light, position)
+        return sampler.inside(to_light)[..., None] * np.asarray(light.radiance_rgb)
+    return _map_sampler(light).radiance(to_light)
+
+
+class _SphereSampler:
+    """Directions to a sphere, uniform in the cone that it fills."""
+
+    def __init__(self, light: SphereLight, position: np.ndarray):
+        away = np.subtract(light.center, position)
+        distance = np.linalg.norm(away, axis=-1)
+        if np.any(distance <= light.radius):
+            raise InputError("a spherical light holds part of the surface that it lights: make its radius smaller or move it")
+        self.axis = away / distance[:, None]
+        self.rise = 1.0 - np.sqrt(1.0 - (light.radius / distance) ** 2)  # 1 - cos of the half angle
+
+    def draw(self, u: np.ndarray) -> np.ndarray:
+        z = 1.0 - u[..., 0] * self.rise[:, None]
+        r, phi = np.sqrt(np.maximum(1.0 - z * z, 0.0)), 2.0 * np.pi * u[..., 1]
+        local = np.stack([r * np.cos(phi), r * np.sin(phi), z], -1)
+        return np.einsum("nji,nsj->nsi", frames(self.axis, None), local)
+
+    def inside(self, to_light: np.ndarray) -> np.ndarray:
+        return np.einsum("nsi,ni->ns", to_light, self.axis) >= (1.0 - self.rise)[:, None]
+
+    def pdf(self, to_light: np.ndarray) -> np.ndarray:
+        return self.inside(to_light) / (2.0 * np.pi * self.rise[:, None])
+
+
+class _MapSampler:
+    """Directions of a lat-long map, by the luminance of its texels."""
+
+    def __init__(self, image: np.ndarray, scale: np.ndarray, up: str, rows: str):
+        self.image = image * scale
+        self.up = up
+        self.on_poles = rows == "on poles"
+        height, _ = image.shape[:2]
+        sine = np.sin((np.arange(height) + 0.5) / height * np.pi)
+        # A little for every texel: interpolation spreads light to the neighbours of a bright one.
+        power = (np.mean(self.image, -1) + 0.05 * np.mean(self.image)) * sine[:, None]
+        self.texel = power / np.sum(power)
+        self.cumulative = np.cumsum(self.texel.ravel())
+        self.sine = sine
+
+    def draw(self, u: np.ndarray) -> np.ndarray:
+        height, width = self.texel.shape
+        index = np.minimum(np.searchsorted(self.cumulative, u[..., 0]), self.texel.size - 1)
+        below = self.cumulative[index] - self.texel.ravel()[index]
+        within = np.clip((u[..., 0] - below) / self.texel.ravel()[index], 0.0, 1.0)
+        row, column = np.divmod(index, width)
+        phi = 2.0 * np.pi * (column + within) / width
+        theta = np.pi * (row + u[..., 1]) / height
+        d = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)], -1)
+        return _from_map(d, self.up)
+
+    def _place(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        d = _to_map(d, self.up)
+        u = (np.arctan2(d[..., 0], -d[..., 2]) / (2.0 * np.pi)) % 1.0
+        v = np.arccos(np.clip(d[..., 1], -1.0, 1.0)) / np.pi
+        return u, v
+
+    def pdf(self, to_light: np.ndarray) -> np.ndarray:
+        height, width = self.texel.shape
+        u, v = self._place(to_light)
+        row = np.minimum((v * height).astype(int), height - 1)
+        column = np.minimum((u * width).astype(int), width - 1)
+        sine = np.maximum(np.sin(np.pi * v), 1e-6)
+        return self.texel[row, column] * height * width / (2.0 * np.pi**2 * sine)
+
+    def radiance(self, to_light: np.ndarray) -> np.ndarray:
+        height, width = self.texel.shape
+        u, v = self._place(to_light)
+        x = u * width - 0.5
+        y = v * (height - 1) if self.on_poles else np.clip(v * height - 0.5, 0.0, height - 1.0)
+        x0, y0 = np.floor(x).astype(int), np.minimum(np.floor(y).astype(int), max(height - 2, 0))
+        fx, fy = (x - x0)[..., None], (y - y0)[..., None]
+        left, right, low = x0 % width, (x0 + 1) % width, np.minimum(y0 + 1, height - 1)
+        top = self.image[y0, left] * (1.0 - fx) + self.image[y0, right] * fx
+        bottom = self.image[low, left] * (1.0 - fx) + self.image[low, right] * fx
+        return top * (1.0 - fy) + bottom * fy
+
+
+def _to_map(d: np.ndarray, up: str) -> np.ndarray:
+    return d if up == "y" else np.stack([d[..., 0], d[..., 2], -d[..., 1]], -1)
+
+
+def _from_map(d: np.ndarray, up: str) -> np.ndarray:
+    return d if up == "y" else np.stack([d[..., 0], -d[..., 2], d[..., 1]], -1)
+
+
+@functools.lru_cache(maxsize=4)
+def _map_sampler(light: EnvironmentMap) -> _MapSampler:
+    from .channels import resolve
+
+    image = resolve(read_exr(light.file), {}).beauty.astype(float)
+    if not np.all(np.isfinite(image)) or np.any(image < 0.0) or not np.any(image > 0.0):
+        raise InputError(f"{light.file}: an environment map holds finite radiance, nowhere negative and somewhere above 0")
+    return _MapSampler(image, np.asarray(light.scale), light.up, light.rows)

@@ -1,0 +1,192 @@
+"""From a reference image to flat samples: what the fit, the picture and the shader check are all computed from."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .channels import Channels, resolve
+from .exr import read_exr
+from .geometry import Surface, frames, normalise, sphere_surface, sphere_tangent
+from .lights import is_exact, receive
+from ..stack import Stack
+from .scene import Reference, Scene
+
+QUADRATURE = 992
+"""Directions a pixel for light that is not a point: .3 % rms of the radiance under a studio map with a coat of width .1."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Samples:
+    """Pixels of one reference that a material is compared on, in their surface frames, float32.
+
+    `wi` and `weight` are (pixels, samples, 3), `wo` and `target` (pixels, 3): pixel = sum over samples of f(wi, wo) weight.
+    """
+
+    wi: np.ndarray
+    wo: np.ndarray
+    weight: np.ndarray
+    target: np.ndarray
+    noise: np.ndarray | None
+    """Standard error of the target where the file has it: its law, never its value at one pixel, informs the weights."""
+    index: np.ndarray
+    """Row-major place of each pixel in the image."""
+    shape: tuple[int, int]
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """A reference, read: the geometry of its usable pixels, from which samples are drawn at any quality."""
+
+    reference: Reference
+    target: np.ndarray
+    noise: np.ndarray | None
+    position: np.ndarray
+    normal: np.ndarray
+    tangent: np.ndarray | None
+    view: np.ndarray
+    index: np.ndarray
+    shape: tuple[int, int]
+    dropped: dict[str, int]
+    """Pixels that are not used, by reason."""
+    picture: np.ndarray
+    """The whole image, (H, W, 3), for looking at."""
+
+    @property
+    def exact(self) -> bool:
+        """Whether every light is a point: no quadrature."""
+        return all(is_exact(light) for light in self.reference.lights)
+
+    @property
+    def covered(self) -> np.ndarray:
+        """Where the usable pixels are, (H, W)."""
+        return self.image(np.ones(len(self.index), bool))
+
+    def image(self, values: np.ndarray) -> np.ndarray:
+        """Values (pixels, ...) put back in their places, (H, W, ...); elsewhere 0."""
+        image = np.zeros((self.shape[0] * self.shape[1], *values.shape[1:]), values.dtype)
+        image[self.index] = values
+        return image.reshape(*self.shape, *values.shape[1:])
+
+    def scales(self, stack: Stack) -> np.ndarray | None:
+        """Thickness of each coat in this image over that of the material, or None where all are 1."""
+        scale = [self.reference.thickness_scale.get(layer.name, 1.0) for layer in stack.layers]
+        return None if all(s == 1.0 for s in scale) else np.array(scale, np.float32)
+
+    def samples(self, which: np.ndarray | None = None, quadrature: int = QUADRATURE, seed: int = 0) -> Samples:
+        """Samples of all usable pixels, or of some."""
+        which = np.arange(len(self.index)) if which is None else which
+        normal, view = self.normal[which], self.view[which]
+        received = receive(self.reference.lights, self.position[which], normal, view, quadrature, seed)
+        to_surface = frames(normal, None if self.tangent is None else self.tangent[which])
+        return Samples(
+            wi=np.einsum("nij,nsj->nsi", to_surface, received.to_light).astype(np.float32),
+            wo=np.einsum("nij,nj->ni", to_surface, view).astype(np.float32),
+            weight=received.weight.astype(np.float32),
+            target=self.target[which].astype(np.float32),
+            noise=None if self.noise is None else self.noise[which].astype(np.float32),
+            index=self.index[which],
+            shape=self.shape,
+        )
+
+
+def load(scene: Scene) -> list[View]:
+    """Read every reference of a scene. Raises `InputError` for one that cannot be fitted."""
+    return [load_reference(reference, scene.fit.min_cosine) for reference in scene.references]
+
+
+def load_reference(reference: Reference, min_cosine: float) -> View:
+    """Read a reference render and keep the pixels that can be compared: covered, finite, seen and lit at no grazing angle."""
+    channels = resolve(read_exr(reference.exr), dict(reference.channels))
+    height, width = channels.beauty.shape[:2]
+    surface, tangent = _surface(reference, channels, height, width)
+    eye = np.asarray(reference.camera.position)
+    if reference.geometry and np.linalg.norm(eye - reference.geometry.center) <= reference.geometry.radius:
+        raise InputError(f"{reference.exr}: the camera stands inside the sphere; check camera.position and geometry.radius")
+    view = normalise(eye - surface.position)
+    NoV = np.sum(surface.normal * view, -1)
+    beauty = channels.beauty
+    reasons = {
+        "not covered by the object": surface.covered,
+        "NaN or infinite": np.all(np.isfinite(beauty), -1) & np.all(np.isfinite(surface.normal), -1),
+        "masked": _mask(reference.mask, (height, width)),
+        f"seen at a grazing angle (cosine below {min_cosine:g})": min_cosine < NoV,
+    }
+    kept = np.ones((height, width), bool)
+    dropped = {}
+    for reason, passes in reasons.items():
+        dropped[reason] = int(np.sum(kept & ~passes))
+        kept &= passes
+    if all(is_exact(light) for light in reference.lights):
+        flat = np.flatnonzero(kept)
+        args = (surface.position.reshape(-1, 3)[flat], surface.normal.reshape(-1, 3)[flat], view.reshape(-1, 3)[flat])
+        received = receive(reference.lights, *args, samples=1, seed=0)
+        NoL = np.einsum("nsj,nj->ns", received.to_light, args[1])
+        lit = np.any((min_cosine < NoL) & np.any(received.weight > 0.0, -1), 1)
+        # A pixel that a grazing light reaches and no other holds little but the model's weakest angle.
+        dropped[f"lit at a grazing angle or not at all (cosine below {min_cosine:g})"] = int(np.sum(~lit))
+        if flat.size and not lit.any():
+            raise InputError(f"{reference.exr}: no light reaches the visible side of the object; check the positions in [[light]]")
+        kept.reshape(-1)[flat[~lit]] = False
+    index = np.flatnonzero(kept)
+    if index.size < 32:
+        lost = ", ".join(f"{count} {reason}" for reason, count in dropped.items() if count)
+        raise InputError(f"{reference.exr}: only {index.size} of {height * width} pixels can be compared ({lost})")
+    target = beauty.reshape(-1, 3)[index].astype(float)
+    if not np.any(target > 0.0):
+        raise InputError(f"{reference.exr}: the object is black in every usable pixel; check the beauty channels and the lights")
+    pick = lambda image: image.reshape(-1, 3)[index]  # noqa: E731
+    return View(
+        reference=reference,
+        target=target,
+        noise=None if channels.noise is None else pick(channels.noise).astype(float),
+        position=pick(surface.position),
+        normal=pick(surface.normal),
+        tangent=None if tangent is None else pick(tangent),
+        view=pick(view),
+        index=index,
+        shape=(height, width),
+        dropped={reason: count for reason, count in dropped.items() if count},
+        picture=beauty,
+    )
+
+
+def _surface(reference: Reference, channels: Channels, height: int, width: int) -> tuple[Surface, np.ndarray | None]:
+    if reference.geometry:
+        surface = sphere_surface(reference.geometry, reference.camera, height, width)
+        return surface, sphere_tangent(surface.normal, reference.camera.up)
+    if channels.normal is None or channels.position is None:
+        missing = "normal" if channels.normal is None else "position"
+        raise InputError(
+            f'{reference.exr}: there is no {missing} channel and the scene gives no geometry. Render one, name it with {missing} = "..." '
+            'under [reference], or give [geometry] kind = "sphere".'
+        )
+    length = np.linalg.norm(channels.normal, axis=-1)
+    covered = length > 0.5
+    if channels.alpha is not None:
+        covered &= channels.alpha > 1.0 - 1e-4
+    else:
+        # Without coverage, a pixel at a silhouette shows in its neighbours: some of them are empty.
+        covered = _eroded(covered)
+    return Surface(channels.position.astype(float), normalise(channels.normal.astype(float)), covered), None
+
+
+def _eroded(mask: np.ndarray) -> np.ndarray:
+    padded = np.pad(mask, 1, constant_values=False)
+    result = mask.copy()
+    for dy in (0, 1, 2):
+        for dx in (0, 1, 2):
+            result &= padded[dy : dy + mask.shape[0], dx : dx + mask.shape[1]]
+    return result
+
+
+def _mask(path: Path | None, shape: tuple[int, int]) -> np.ndarray:
+    if path is None:
+        return np.ones(shape, bool)
+    channels: dict[str, Any] = dict(read_exr(path).channels)
+    first = next(iter(channels.values()))
+    if first.shape != shape:
+        raise InputError(f"{path}: the mask is {first.shape[1]} x {first.shape[0]}, the reference {shape[1]} x {shape[0]} pixels")
+    return first > 0.5

@@ -1,0 +1,335 @@
+"""Scene files: what is known of a reference render, and what is asked of the fit.
+
+`read_scene` returns plain records; nothing is opened but the scene file itself and the preset that it names.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..documents import check_keys, nearest, read_document
+from ..errors import InputError
+from ..preset import read_preset, stack_of
+from ..stack import Stack
+
+Vector = tuple[float, float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Camera:
+    """A pinhole camera."""
+
+    position: Vector
+    look_at: Vector
+    up: Vector
+    vfov_deg: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Sphere:
+    """Analytic geometry of the reference."""
+
+    center: Vector = (0.0, 0.0, 0.0)
+    radius: float = 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Directional:
+    """Light from one direction: pixel = f cos irradiance."""
+
+    to_light: Vector
+    irradiance_rgb: Vector
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    """A point light: pixel = f cos intensity / distance^2."""
+
+    position: Vector
+    intensity_rgb: Vector
+
+
+@dataclasses.dataclass(frozen=True)
+class Constant:
+    """The same radiance from everywhere."""
+
+    radiance_rgb: Vector
+
+
+@dataclasses.dataclass(frozen=True)
+class SphereLight:
+    """A sphere of constant radiance."""
+
+    center: Vector
+    radius: float
+    radiance_rgb: Vector
+
+
+@dataclasses.dataclass(frozen=True)
+class EnvironmentMap:
+    """A lat-long image at infinity, Y up: u = atan2(d.x, -d.z) / 2 pi mod 1, v = acos(d.y) / pi, row 0 up.
+
+    `up = "z"` is for renderers with Z up: the map's Y axis is then the scene's Z, and its -Z the scene's Y.
+    `rows` says where row 0 lies: its "centre" half a row below the pole, or "on poles" (Mitsuba 3).
+    """
+
+    file: Path
+    scale: Vector = (1.0, 1.0, 1.0)
+    up: str = "y"
+    rows: str = "centre"
+
+
+Light = Directional | Point | Constant | SphereLight | EnvironmentMap
+
+
+@dataclasses.dataclass(frozen=True)
+class Reference:
+    """One image, with the camera and the lights that it was rendered with."""
+
+    exr: Path
+    camera: Camera
+    lights: tuple[Light, ...]
+    geometry: Sphere | None
+    channels: Mapping[str, str]
+    mask: Path | None
+    thickness_scale: Mapping[str, float]
+    """Thickness of a coat in this image over that of the material, by layer name."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FitRequest:
+    """What the scene file asks of the fit."""
+
+    free: tuple[str, ...] | None = None
+    fixed: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    loss: str = "square"
+    min_cosine: float = 0.1
+    weights: str = "law"
+    starts: int = 8
+    seed: int = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Scene:
+    """A scene file, read and checked."""
+
+    path: Path
+    references: tuple[Reference, ...]
+    start: Stack
+    fit: FitRequest
+
+
+def read_scene(path: Path) -> Scene:
+    """Read a scene file (TOML or JSON). Raises `InputError` naming the key at fault."""
+    document = read_document(path)
+    where = str(path)
+    check_keys(document, ("reference", "geometry", "camera", "light", "material", "fit"), where)
+    entries = document.get("reference")
+    if entries is None:
+        raise InputError(f'{where}: there is no [reference]; give one, with exr = "NAME.exr"')
+    entries = entries if isinstance(entries, list) else [entries]
+    return Scene(
+        path,
+        tuple(r for k, entry in enumerate(entries) for r in _references(entry, document, path, f"{where}: reference[{k}]")),
+        _start(document.get("material"), path),
+        _fit(document.get("fit", {}), f"{where}: fit"),
+    )
+
+
+_CHANNEL_KEYS = ("beauty", "alpha", "normal", "position", "depth", "noise")
+
+
+def _references(entry: Any, document: Mapping[str, Any], path: Path, where: str) -> list[Reference]:
+    check_keys(entry, ("exr", *_CHANNEL_KEYS, "mask", "camera", "light", "geometry", "thickness_scale"), where)
+    if "exr" not in entry:
+        raise InputError(f"{where}: there is no exr; name the reference render")
+    names = entry["exr"] if isinstance(entry["exr"], list) else [entry["exr"]]
+    camera = entry.get("camera", document.get("camera"))
+    lights = entry.get("light", document.get("light"))
+    geometry = entry.get("geometry", document.get("geometry"))
+    if camera is None:
+        raise InputError(f"{path}: there is no [camera]; give its position, look_at, up and vfov_deg")
+    if not lights:
+        raise InputError(f'{path}: there is no [[light]]; give at least one, for example type = "directional"')
+    channels = {key: _text(entry[key], f"{where}.{key}") for key in _CHANNEL_KEYS if key in entry}
+    scale = entry.get("thickness_scale", {})
+    check = {str(k): _positive(v, f"{where}.thickness_scale.{k}") for k, v in dict(scale).items()}
+    lights = lights if isinstance(lights, list) else [lights]
+    return [
+        Reference(
+            exr=path.parent / _text(name, f"{where}.exr"),
+            camera=_camera(camera, f"{path}: camera"),
+            lights=tuple(_light(light, path, f"{path}: light[{k}]") for k, light in enumerate(lights)),
+            geometry=None if geometry is None else _geometry(geometry, f"{path}: geometry"),
+            channels=channels,
+            mask=path.parent / _text(entry["mask"], f"{where}.mask") if "mask" in entry else None,
+            thickness_scale=check,
+        )
+        for name in names
+    ]
+
+
+def _start(material: Any, path: Path) -> Stack:
+    where = f"{path}: material"
+    if material is None:
+        raise InputError(f'{path}: there is no [material]; name a start with preset = "FILE.json" or give layers and base')
+    if not isinstance(material, Mapping):
+        raise InputError(f"{where}: should be a table of keys, not {material!r}")
+    if "preset" not in material:
+        return stack_of(material, where)
+    check_keys(material, ("preset", "model", "options"), where)
+    stack = read_preset(path.parent / _text(material["preset"], f"{where}.preset"))
+    if "model" not in material:
+        return stack
+    form = {key: material[key] for key in ("model", "options") if key in material}
+    return dataclasses.replace(stack, form=stack_of(form | {"base": {"type": "lambert"}}, where).form)
+
+
+def _fit(table: Any, where: str) -> FitRequest:
+    check_keys(table, [f.name for f in dataclasses.fields(FitRequest)], where)
+    values = dict(table)
+    if "free" in values:
+        if not isinstance(values["free"], list) or not all(isinstance(v, str) for v in values["free"]):
+            raise InputError(f'{where}.free: should be a list of parameters such as "coat.alpha"')
+        values["free"] = tuple(values["free"])
+    for key, known in (("loss", ("square", "huber", "cauchy")), ("weights", ("law", "uniform"))):
+        if values.get(key, known[0]) not in known:
+            raise InputError(
+                f"{where}.{key} = {values[key]!r}: should be one of {', '.join(known)}{nearest(str(values[key]), known)}"
+            )
+    if "min_cosine" in values and not 0.0 <= _finite(values["min_cosine"], f"{where}.min_cosine") < 1.0:
+        raise InputError(f"{where}.min_cosine = {values['min_cosine']!r}: should be from 0 to below 1")
+    for key in ("starts", "seed"):
+        if key in values and (not isinstance(values[key], int) or values[key] < (1 if key == "starts" else 0)):
+            raise InputError(
+                f"{where}.{key} = {values[key]!r}: should be a whole number{' from 1 up' if key == 'starts' else ''}"
+            )
+    return FitRequest(**values)
+
+
+def _camera(table: Any, where: str) -> Camera:
+    check_keys(table, ("position", "look_at", "up", "vfov_deg"), where)
+    camera = Camera(
+        _vector(_need(table, "position", where), f"{where}.position"),
+        _vector(_need(table, "look_at", where), f"{where}.look_at"),
+        _vector(table.get("up", (0.0, 1.0, 0.0)), f"{where}.up"),
+        _finite(_need(table, "vfov_deg", where), f"{where}.vfov_deg"),
+    )
+    if not 0.0 < camera.vfov_deg < 180.0:
+        raise InputError(f"{where}.vfov_deg = {camera.vfov_deg:g}: a vertical field of view lies between 0 and 180 degrees")
+    view = np.subtract(camera.look_at, camera.position)
+    if np.linalg.norm(np.cross(view, camera.up)) < 1e-9 * max(np.linalg.norm(view), 1e-30):
+        raise InputError(
+            f"{where}: position, look_at and up do not span a view: look_at equals position, or up is along the view"
+        )
+    return camera
+
+
+def _geometry(table: Any, where: str) -> Sphere:
+    check_keys(table, ("kind", "center", "radius"), where)
+    if table.get("kind") != "sphere":
+        raise InputError(
+            f'{where}.kind = {table.get("kind")!r}: should be "sphere"; leave [geometry] out to use the EXR\'s channels'
+        )
+    return Sphere(
+        _vector(table.get("center", (0.0, 0.0, 0.0)), f"{where}.center"), _positive(table.get("radius", 1.0), f"{where}.radius")
+    )
+
+
+def _light(table: Any, path: Path, where: str) -> Light:
+    if not isinstance(table, Mapping) or table.get("type") not in _LIGHTS:
+        kind = table.get("type") if isinstance(table, Mapping) else table
+        raise InputError(f"{where}.type = {kind!r}: should be one of {', '.join(_LIGHTS)}{nearest(str(kind), _LIGHTS)}")
+    cls, readers = _LIGHTS[table["type"]]
+    check_keys(table, ("type", *readers), where)
+    needed = {f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING}
+    values = {}
+    for key, reader in readers.items():
+        if key in table:
+            values[key] = reader(table[key], f"{where}.{key}")
+        elif key in needed:
+            raise InputError(f"{where}: a light of type {table['type']!r} needs {key}")
+    values.pop("layout", None)
+    if "file" in values:
+        values["file"] = path.parent / values["file"]
+    return cls(**values)
+
+
+def _need(table: Mapping[str, Any], key: str, where: str) -> Any:
+    if key not in table:
+        raise InputError(f"{where}: {key} is missing")
+    return table[key]
+
+
+def _text(value: Any, where: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise InputError(f"{where} = {value!r}: should be text")
+    return value
+
+
+def _finite(value: Any, where: str) -> float:
+    if not isinstance(value, (int, float)) or isinstance(value, bool) or not math.isfinite(value):
+        raise InputError(f"{where} = {value!r}: should be a finite number")
+    return float(value)
+
+
+def _positive(value: Any, where: str) -> float:
+    if _finite(value, where) <= 0.0:
+        raise InputError(f"{where} = {value!r}: should be above 0")
+    return float(value)
+
+
+def _vector(value: Any, where: str) -> Vector:
+    if not isinstance(value, (list, tuple)) or len(value) != 3:
+        raise InputError(f"{where} = {value!r}: should be a list of three numbers")
+    x, y, z = (_finite(v, where) for v in value)
+    return (x, y, z)
+
+
+def _direction(value: Any, where: str) -> Vector:
+    vector = np.array(_vector(value, where))
+    length = float(np.linalg.norm(vector))
+    if length == 0.0:
+        raise InputError(f"{where} = {value!r}: a direction is not zero")
+    x, y, z = (vector / length).tolist()
+    return (x, y, z)
+
+
+def _rgb(value: Any, where: str) -> Vector:
+    rgb = _vector([value] * 3 if isinstance(value, (int, float)) else value, where)
+    if min(rgb) < 0.0:
+        raise InputError(f"{where} = {value!r}: light is not negative")
+    return rgb
+
+
+def _layout(value: Any, where: str) -> str:
+    if value != "lat-long, Y up":
+        raise InputError(
+            f'{where} = {value!r}: should be "lat-long, Y up" (u = atan2(d.x, -d.z) / 2 pi mod 1, v = acos(d.y) / pi)'
+        )
+    return value
+
+
+def _one_of(*known: str) -> Callable[[Any, str], str]:
+    def read(value: Any, where: str) -> str:
+        if value not in known:
+            raise InputError(f"{where} = {value!r}: should be one of {', '.join(known)}{nearest(str(value), known)}")
+        return value
+
+    return read
+
+
+_LIGHTS: dict[str, tuple[type, dict[str, Callable[[Any, str], Any]]]] = {
+    "directional": (Directional, {"to_light": _direction, "irradiance_rgb": _rgb}),
+    "point": (Point, {"position": _vector, "intensity_rgb": _rgb}),
+    "constant": (Constant, {"radiance_rgb": _rgb}),
+    "sphere": (SphereLight, {"center": _vector, "radius": _positive, "radiance_rgb": _rgb}),
+    "envmap": (
+        EnvironmentMap,
+        {"file": _text, "scale": _rgb, "up": _one_of("y", "z"), "rows": _one_of("centre", "on poles"), "layout": _layout},
+    ),
+}

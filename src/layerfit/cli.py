@@ -1,0 +1,256 @@
+"""The command line. Heavy modules are imported where a command needs them: `layerfit --help` answers at once.
+
+Data on standard output, tables and progress on standard error. Exit codes: 0 done and good; 1 done, with findings; 2 the input or
+the machine is at fault, with a message that says what to do.
+"""
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from .errors import LayerfitError
+
+STARTED = time.perf_counter()
+
+app = typer.Typer(
+    name="layerfit",
+    help="Fit layered materials to reference renders and get a verified shader back.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+stderr = Console(stderr=True, highlight=False)
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
+Scene = Annotated[Path, typer.Argument(help="Scene file (TOML or JSON): reference, camera, lights, material, fit.")]
+Preset = Annotated[Path, typer.Argument(help="Preset file (JSON): a material.")]
+
+
+def main() -> None:
+    """Run the command line; every fault of input or machine is one message and exit code 2."""
+    try:
+        app()
+    except LayerfitError as error:
+        stderr.print(f"[bold red]layerfit:[/] {_plain(error)}", soft_wrap=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        stderr.print("layerfit: interrupted; files that were complete are kept")
+        sys.exit(130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+
+
+def _plain(error: Exception) -> str:
+    from rich.markup import escape
+
+    return escape(str(error))
+
+
+def _emit(document: Any) -> None:
+    json.dump(document, sys.stdout, indent=2, allow_nan=False)
+    sys.stdout.write("\n")
+
+
+@app.command()
+def fit(
+    scene: Scene,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    starts: Annotated[int | None, typer.Option(min=1, help="Starts that are tried; more find a global minimum more surely.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")] = None,
+    loss: Annotated[str | None, typer.Option(help="square, huber or cauchy.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Fit a material to a reference render.
+
+    Leaves `fit.json`, `preset.json`, `material.frag`, `report.html`, `fit.png` and `trace.csv` in the output directory.
+
+    Example: `layerfit fit examples/references/lacquered_copper.toml -o out/copper`
+    """
+    from .cache import use_compilation_cache
+
+    use_compilation_cache()
+    from .job import fit_scene
+
+    imported = time.perf_counter() - STARTED
+    if loss not in (None, "square", "huber", "cauchy"):
+        raise typer.BadParameter(f"{loss!r} is not square, huber or cauchy", param_hint="--loss")
+    with _progress() as report:
+        outcome = fit_scene(scene, output, import_s=imported, progress=report, starts=starts, seed=seed, loss=loss)
+    _show_fit(outcome, as_json)
+    raise typer.Exit(0 if outcome.good else 1)
+
+
+def _show_fit(outcome: Any, as_json: bool) -> None:
+    from .report.text import lines
+
+    for line in lines(outcome.document):
+        stderr.print(line, markup=False, soft_wrap=True)
+    stderr.print(f"Results are in {outcome.directory}/: fit.png, report.html, material.frag, preset.json, fit.json", markup=False)
+    if as_json:
+        _emit(outcome.document)
+
+
+class _progress:
+    """A bar on standard error while a fit runs; nothing where that is not a terminal."""
+
+    def __enter__(self) -> Any:
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        self.bar = Progress(
+            TextColumn("{task.description:>8}"), BarColumn(), TimeElapsedColumn(), console=stderr, transient=True, disable=not stderr.is_terminal
+        )
+        self.bar.start()
+        self.task = self.bar.add_task("reading", total=1.0)
+        return lambda stage, share: self.bar.update(self.task, description=stage, completed=share)
+
+    def __exit__(self, *exc: object) -> None:
+        self.bar.stop()
+
+
+@app.command()
+def render(
+    preset: Preset,
+    scene: Scene,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write: .exr (linear) or .png.")],
+) -> None:
+    """Render a preset in place of a scene's reference: same camera, lights and pixels.
+
+    Example: `layerfit render out/preset.json scene.toml -o copper.exr`
+    """
+    from .cache import use_compilation_cache
+
+    use_compilation_cache()
+    from .capture.samples import load
+    from .capture.scene import read_scene
+    from .job import write_render
+    from .preset import read_preset
+
+    written = write_render(read_preset(preset), load(read_scene(scene)), output)
+    for path in written:
+        typer.echo(str(path))
+
+
+@app.command(name="eval")
+def evaluate(
+    preset: Preset,
+    directions: Annotated[Path, typer.Argument(help="CSV with columns wi_x wi_y wi_z wo_x wo_y wo_z in the surface frame.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="CSV to write; left out, standard output.")] = None,
+) -> None:
+    """Evaluate the BRDF [1/sr] of a preset at pairs of directions, without the cosine: columns f_r, f_g, f_b.
+
+    Example: `layerfit eval out/preset.json directions.csv -o values.csv`
+    """
+    from .documents import write_text
+    from .preset import read_preset
+    from .tabulate import evaluate_table
+
+    text = evaluate_table(read_preset(preset), directions)
+    if output is None:
+        sys.stdout.write(text)
+    else:
+        write_text(output, text)
+        stderr.print(f"wrote {output}", markup=False)
+
+
+@app.command()
+def export(
+    preset: Preset,
+    target: Annotated[str, typer.Option(help="glsl330 or essl300.")] = "glsl330",
+    uniforms: Annotated[bool, typer.Option("--uniforms", help="Parameters as uniforms, for live tuning, not as constants.")] = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Shader to write; left out, standard output.")] = None,
+) -> None:
+    """Print the shader of a preset.
+
+    Example: `layerfit export out/preset.json --target essl300 -o copper.frag`
+    """
+    from .documents import nearest, write_text
+    from .errors import InputError
+    from .preset import read_preset
+    from .shader.export import HEADERS, print_material
+
+    if target not in HEADERS:
+        raise InputError(f"--target {target}: should be one of {', '.join(HEADERS)}{nearest(target, HEADERS)}")
+    text = print_material(read_preset(preset), preset.stem, uniforms).text(target)
+    if output is None:
+        sys.stdout.write(text)
+    else:
+        write_text(output, text)
+        stderr.print(f"wrote {output}", markup=False)
+
+
+@app.command()
+def verify(
+    preset: Preset,
+    scene: Annotated[Path | None, typer.Argument(help="Scene file: also compare pixels with its references.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the picture strip.")] = None,
+    as_json: Json = False,
+    fail: Annotated[float | None, typer.Option(help="Relative difference from JAX that p99.9 of the values may have.")] = None,
+    hardfail: Annotated[float | None, typer.Option(help="Relative difference from JAX that any value may have.")] = None,
+) -> None:
+    """Render the printed shader of a preset in OpenGL and compare it with JAX, number by number, and with references.
+
+    Example: `layerfit verify out/preset.json scene.toml -o out`
+    """
+    from .cache import use_compilation_cache
+
+    use_compilation_cache()
+    from .job import verify_preset
+    from .preset import read_preset
+
+    document, picture = verify_preset(read_preset(preset), preset.stem, scene, output, fail, hardfail)
+    parity, worst = document["parity"], document["parity"]["worst"]
+    stderr.print(f"{document['renderer']}", markup=False)
+    stderr.print(f"shader against JAX: max {parity['max_rel']:.2e}, p99.9 {parity['p999_rel']:.2e} relative", markup=False)
+    stderr.print(f"worst value: {worst}", markup=False)
+    if document["image"]:
+        image = document["image"]
+        stderr.print(
+            f"shader against reference: PSNR {image['psnr_db']:.1f} dB, SSIM {image['ssim']:.4f}, delta E 2000 {image['delta_e']:.2f}",
+            markup=False,
+        )
+    if picture:
+        stderr.print(f"Picture: {picture}", markup=False)
+    stderr.print("PASS" if document["passed"] else "FAILURE", markup=False)
+    if as_json:
+        _emit(document)
+    raise typer.Exit(0 if document["passed"] else 1)
+
+
+@app.command()
+def inspect(
+    file: Annotated[Path, typer.Argument(help="EXR file.")],
+    as_json: Json = False,
+) -> None:
+    """Say what an EXR holds, which channels a fit would use and why, and what looks wrong.
+
+    Example: `layerfit inspect render.exr`
+    """
+    from .capture.inspect import inspect as inspect_file
+
+    found = inspect_file(file)
+    if as_json:
+        _emit(found.to_json())
+    else:
+        Console(highlight=False).print(found.render())
+    raise typer.Exit(1 if any(finding.severity == "warning" for finding in found.findings) else 0)
+
+
+@app.command()
+def demo(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out/demo"),
+) -> None:
+    """Fit the references that layerfit ships, verify their shaders, and say where the pictures are."""
+    from .cache import use_compilation_cache
+
+    use_compilation_cache()
+    from .demo import run
+
+    raise typer.Exit(0 if run(output, stderr) else 1)

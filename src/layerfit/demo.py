@@ -1,0 +1,35 @@
+"""The demonstration: every shipped reference fitted, its shader verified, its pictures written."""
+
+from pathlib import Path
+from typing import Any
+
+from ._data import references
+from .job import Outcome, fit_scene
+from .report.text import number
+
+
+def run(directory: Path, console: Any) -> bool:
+    """Fit all shipped references into `directory`, a folder each; prints a line each and where the pictures are."""
+    scenes = sorted(references().glob("*.toml"))
+    outcomes: list[tuple[str, Outcome]] = []
+    for k, scene in enumerate(scenes):
+        console.print(f"[{k + 1}/{len(scenes)}] {scene.stem}", markup=False)
+        outcome = fit_scene(scene, directory / scene.stem)
+        outcomes.append((scene.stem, outcome))
+        for line in _summary(outcome.document):
+            console.print(f"      {line}", markup=False, soft_wrap=True)
+    console.print("\nPictures and reports:", markup=False)
+    for name, outcome in outcomes:
+        console.print(f"  {outcome.directory / 'fit.png'}  (report.html, material.frag, preset.json beside it)", markup=False, soft_wrap=True)
+    return all(outcome.good for _, outcome in outcomes)
+
+
+def _summary(document: dict[str, Any]) -> list[str]:
+    rows = [
+        f"{name} = {number(row['value'])} +/- {number(row['sigma'])}" for name, row in document["parameters"].items()
+    ]
+    error, parity = document["error"], document["parity"]
+    return [
+        ", ".join(rows),
+        f"fit error {error['rel_l2']:.3g} relative L2, shader against JAX {parity['max_rel']:.1e}, {document['time']['total_s']:.1f} s",
+    ]

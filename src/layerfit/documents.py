@@ -1,0 +1,92 @@
+"""Documents that users write and read: TOML and JSON in, whole files out."""
+
+import difflib
+import json
+import os
+import tempfile
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError
+
+MAX_BYTES = 4 * 2**20
+"""Scene files and presets are a few kB; anything larger is not one."""
+
+
+def read_document(path: Path) -> dict[str, Any]:
+    """A TOML (`.toml`) or JSON file as a table. Raises `InputError` with the place of the fault."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{path}: {path.stat().st_size} bytes are too many for a scene file or a preset")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}. Check the path and its permissions.") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); is it another kind of file?") from None
+    try:
+        document = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
+    except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: not valid {'TOML' if path.suffix == '.toml' else 'JSON'}: {error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: nested too deeply to be a scene file or a preset") from None
+    if not isinstance(document, dict):
+        raise InputError(f"{path}: should hold a table of keys, not a {type(document).__name__}")
+    return document
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """'; did you mean "..."?' where something known is close, else nothing."""
+    close = difflib.get_close_matches(word, list(known), 1, 0.5)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def check_keys(document: Any, known: Sequence[str], where: str) -> None:
+    """Raise `InputError` for a key that is not known, naming the nearest one."""
+    if not isinstance(document, Mapping):
+        raise InputError(f"{where}: should be a table of keys, not {document!r}")
+    for key in document:
+        if key not in known:
+            raise InputError(f"{where}: unknown key {key!r}{nearest(str(key), known)}. Known keys: {', '.join(known)}")
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all: to a temporary name beside it, then renamed."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}. Choose another output path.") from None
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, path)
+    except OSError as error:
+        Path(temporary).unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written: {error.strerror}. Nothing of it was changed.") from None
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: Path, content: str) -> None:
+    """`write_bytes` for text, in UTF-8."""
+    write_bytes(path, content.encode())
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def ensure_directory(path: Path) -> None:
+    """Make a directory for results, or say at once why it cannot be written to."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written to: {error.strerror}. Choose another output directory with -o.") from None

@@ -1,0 +1,1 @@
+"""From samples to a material: parameters, residuals, the solve, and what it can and cannot tell."""

@@ -1,0 +1,128 @@
+"""Samples of all references as equal blocks of pixels: one compiled step serves a thousand pixels and a million.
+
+Pixels are dealt to the blocks in an order stratified by half angle, so that the first blocks are a fair sample of the image:
+a fit starts on one block and ends on all of them, by a count, without compiling again. Blocks are padded with pixels of weight 0.
+"""
+
+import dataclasses
+
+import jax
+import numpy as np
+
+from .._chunk import struct
+from ..capture.samples import Samples
+
+LARGEST = 4096
+"""Pixels in a block: fewer, and the loop over blocks costs more than the pixels in it."""
+
+
+@struct
+class Blocks:
+    """Arrays of (blocks, pixels, ...): directions, weights, targets, residual weights, and thickness scales a block."""
+
+    wi: jax.Array
+    wo: jax.Array
+    weight: jax.Array
+    target: jax.Array
+    inverse_sigma: jax.Array
+    scale: jax.Array | None
+    """(blocks, layers): thickness over that of the material; absent where it is 1 everywhere."""
+
+    @property
+    def count(self) -> int:
+        return self.wo.shape[0]
+
+
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    """Which pixel of which reference stands where: (blocks, pixels) arrays; -1 for padding."""
+
+    reference: np.ndarray
+    pixel: np.ndarray
+    used: int
+    """Blocks that hold pixels; the rest only rounds the number up."""
+
+    def scatter(self, values: list[np.ndarray], fill: float) -> np.ndarray:
+        """Values (pixels, ...) a reference as blocks."""
+        shape = (*self.pixel.shape, *values[0].shape[1:])
+        out = np.full(shape, fill, np.float32)
+        for k, value in enumerate(values):
+            at = self.reference == k
+            out[at] = value[self.pixel[at]]
+        return out
+
+    def gather(self, blocks: np.ndarray, sizes: list[int]) -> list[np.ndarray]:
+        """Blocks as values (pixels, ...) a reference."""
+        values = []
+        for k, size in enumerate(sizes):
+            at = self.reference == k
+            out = np.zeros((size, *blocks.shape[2:]), blocks.dtype)
+            out[self.pixel[at]] = blocks[at]
+            values.append(out)
+        return values
+
+
+def stratified(samples: Samples, seed: int) -> np.ndarray:
+    """An order of the pixels in which every prefix has its share of each half angle.
+
+    A highlight covers few pixels: of a thousand drawn at random, too few lie in it, and the fit finds a minimum without it.
+    """
+    strongest = np.argmax(samples.weight.sum(-1), 1)
+    wi = samples.wi[np.arange(len(strongest)), strongest]
+    h = wi + samples.wo
+    tan = np.hypot(h[:, 0], h[:, 1]) / np.maximum(h[:, 2], 1e-6)
+    # Strata of equal width in log(.05 + tan): about equal numbers for lobes of any width.
+    stratum = np.minimum((np.log1p(tan / 0.05) * 4.0).astype(int), 15)
+    rng = np.random.default_rng(seed)
+    key = np.empty(len(tan))
+    for s in np.unique(stratum):
+        members = rng.permutation(np.flatnonzero(stratum == s))
+        key[members] = (np.arange(len(members)) + rng.random()) / len(members) ** 0.75
+    return np.argsort(key)
+
+
+def arrange(references: list[Samples], scales: np.ndarray | None, seed: int) -> tuple[Blocks, Layout]:
+    """Blocks of all references; `scales` (references, layers) or None. The references take turns, block by block."""
+    lights = max(s.wi.shape[1] for s in references)
+    longest = max(len(s.index) for s in references)
+    size = min(LARGEST, _power_of_two(longest), _power_of_two(16 * LARGEST // lights))
+    rows: list[tuple[int, np.ndarray]] = []
+    for k, samples in enumerate(references):
+        order = stratified(samples, seed + k)
+        rows += [(k, order[start : start + size]) for start in range(0, len(order), size)]
+    # Sorted by place within their reference: the first blocks hold some of each.
+    place = [sum(other == k for other, _ in rows[:i]) for i, (k, _) in enumerate(rows)]
+    rows = [rows[i] for i in np.argsort(place, kind="stable")]
+    count = 2 ** (len(rows) - 1).bit_length()
+    reference = np.full((count, size), -1)
+    pixel = np.full((count, size), -1)
+    for b, (k, members) in enumerate(rows):
+        reference[b, : len(members)] = k
+        pixel[b, : len(members)] = members
+    layout = Layout(reference, pixel, len(rows))
+    up = np.array([0.0, 0.0, 1.0], np.float32)
+
+    def padded(field: str, samples: Samples) -> np.ndarray:
+        value = getattr(samples, field)
+        missing = lights - value.shape[1]
+        return np.pad(value, ((0, 0), (0, missing), (0, 0)), "edge" if field == "wi" else "constant") if missing else value
+
+    wi = layout.scatter([padded("wi", s) for s in references], 0.0)
+    wo = layout.scatter([s.wo for s in references], 0.0)
+    empty = pixel < 0
+    wi[empty] = up
+    wo[empty] = up
+    blocks = Blocks(
+        wi=wi,
+        wo=wo,
+        weight=layout.scatter([padded("weight", s) for s in references], 0.0),
+        target=layout.scatter([s.target for s in references], 0.0),
+        inverse_sigma=layout.scatter([np.ones_like(s.target) for s in references], 0.0),
+        scale=None if scales is None else scales[np.maximum(reference[:, 0], 0)].astype(np.float32),
+    )
+    return blocks, layout
+
+
+def _power_of_two(n: int) -> int:
+    """The smallest power of two that is not below n, and not below 32."""
+    return max(32, 2 ** (n - 1).bit_length())

@@ -1,0 +1,329 @@
+"""The fit: from a scene to a material with its uncertainties."""
+
+import dataclasses
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from ..capture.samples import Samples, View
+from ..errors import InputError
+from ..stack import Stack
+from .blocks import Blocks, arrange
+from .parameters import Parametrisation, parametrise, with_fixed
+from .residuals import Clock, initial, predict, step
+from .solve import NormalLevenbergMarquardt
+from .uncertainty import GROUPS, Uncertainty, estimate
+from .weights import inverse_sigma, robust
+
+PIXELS = 65536
+"""Pixels that a fit uses at most, all references together: more of them do not change the answer by what it can be wrong by."""
+
+EVALUATIONS = 500_000
+"""BRDF evaluations that a step may take where light is a quadrature: it decides how many pixels are used."""
+
+COARSE_STEPS = 12
+FINE_STEPS = 60
+ROUNDS = 3
+"""Reweightings: the weights follow the model's values, which follow the weights."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One step of the fit, for the convergence trace."""
+
+    time_s: float
+    stage: str
+    start: int
+    step: int
+    error: float
+    """Weighted residual over the weighted image, root of sums of squares, of the pixels in use."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Minimum:
+    """Where one start led."""
+
+    start: int
+    vector: np.ndarray
+    cost: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Held:
+    """A free parameter that was held at its start, because the data cannot tell it from another."""
+
+    direction: dict[str, float]
+    why: str
+
+
+@dataclasses.dataclass
+class FitResult:
+    """A fitted material and what is known of it."""
+
+    stack: Stack
+    start: Stack
+    free: Parametrisation
+    vector: np.ndarray
+    start_vector: np.ndarray
+    gram: np.ndarray
+    """J^T J at the solution, in the coordinates of the fit."""
+    uncertainty: Uncertainty
+    held: list[Held]
+    converged: bool
+    cost: float
+    steps: int
+    minima: list[Minimum]
+    notes: list[str]
+    trace: list[Row]
+    models: list[np.ndarray]
+    """Radiance of the fitted material at the usable pixels of each reference."""
+    samples: list[Samples]
+    views: Sequence[View]
+    clock: Clock
+    solve_s: float
+
+
+def fit(
+    views: Sequence[View],
+    start: Stack,
+    *,
+    free: Sequence[str] | None = None,
+    fixed: dict[str, Any] | None = None,
+    weights: str = "law",
+    loss: str = "square",
+    starts: int = 8,
+    seed: int = 0,
+    where: str = "fit",
+    progress: Callable[[str, float], None] = lambda stage, share: None,
+) -> FitResult:
+    """Fit the free parameters of `start` to the references.
+
+    `free` are names such as "coat.alpha" (left out: what an image can tell), `fixed` are values by name. `weights` is "law" or "uniform"
+    (see `weights`), `loss` "square", "huber" or "cauchy". `starts` space-filling starts are tried beside the given one, all
+    coarsely on few pixels, the best of them to the end. Raises `InputError` for what cannot be fitted.
+    """
+    with jax.enable_x64(True):
+        return _Fit(views, start, free, fixed or {}, weights, loss, starts, seed, where, progress).run()
+
+
+class _Fit:
+    def __init__(self, views, start, free, fixed, weights, loss, starts, seed, where, progress):
+        start = with_fixed(start, fixed, f"{where}.fixed")
+        free, self.held = _without_gauge(start, free)
+        start, self.free = parametrise(start, free, tuple(fixed), where)
+        self.explicit = free is not None
+        self.notes: list[str] = []
+        self.start = start.astype(np.float32)
+        self.views, self.weights, self.loss, self.starts, self.seed, self.where = views, weights, loss, starts, seed, where
+        self.progress = progress
+        self.trace: list[Row] = []
+        self.clock = Clock()
+        self.began = time.perf_counter()
+        self.samples = [view.samples(_chosen(view, len(views), seed)) for view in views]
+        self.blocks, self.layout = arrange(self.samples, _scales(views, start), seed)
+        self.solver = NormalLevenbergMarquardt()
+        self._set_bounds()
+
+    def _set_bounds(self) -> None:
+        self.bounds = self.free.bounds()
+
+    def run(self) -> FitResult:
+        origin = self.free.pack(self.start)
+        self._weigh(None)
+        self._drop_blind(origin)
+        origin = self.free.pack(self.start)
+        minima = self._search(origin)
+        best = minima[0]
+        u = best.vector
+        for k in range(ROUNDS):
+            self._weigh(u)
+            u, cost, converged, gram = self._descend(u, self.layout.used, FINE_STEPS, f"fine {k + 1}", best.start)
+            self.progress("fine", (k + 1) / ROUNDS)
+        held = (u <= self.bounds[0]) | (u >= self.bounds[1])
+        uncertainty = estimate(gram, cost, self._residuals(), held, self._parts(u))
+        stack = self.free.put(self.start, self.free.fields(u))
+        stack = jax.tree.map(lambda a: np.asarray(a, np.float32), stack)
+        models = self._models(u)
+        return FitResult(
+            stack=stack,
+            start=self.start,
+            free=self.free,
+            vector=u,
+            start_vector=origin,
+            gram=gram,
+            uncertainty=uncertainty,
+            held=self.held,
+            converged=converged,
+            cost=cost,
+            steps=len(self.trace),
+            minima=minima,
+            notes=self.notes,
+            trace=self.trace,
+            models=models,
+            samples=self.samples,
+            views=self.views,
+            clock=self.clock,
+            solve_s=time.perf_counter() - self.began - self.clock.trace_s - self.clock.compile_s,
+        )
+
+    def _residuals(self) -> int:
+        return sum(s.target.size for s in self.samples)
+
+    def _weigh(self, u: np.ndarray | None) -> None:
+        """Set the residual weights from the model at `u`, or equal ones before there is a model."""
+        kind = self.weights if u is not None else "uniform"
+        models = self._models(u) if u is not None else [s.target for s in self.samples]
+        values = []
+        for model, samples in zip(models, self.samples, strict=True):
+            weight = inverse_sigma(model, samples.target, samples.noise, kind)
+            if u is not None and self.loss != "square":
+                weight = weight * robust((model - samples.target) * weight, self.loss)
+            values.append(weight)
+        weight = self.layout.scatter(values, 0.0)
+        self.brightness = np.sum((weight * np.asarray(self.blocks.target)).astype(float) ** 2, (1, 2))
+        self.blocks = jax.device_put(dataclasses.replace(self.blocks, inverse_sigma=weight))
+
+    def _models(self, u: np.ndarray) -> list[np.ndarray]:
+        values = predict(self.clock, jax.numpy.asarray(u), self.start, self.blocks, free=self.free)
+        return self.layout.gather(np.asarray(values), [len(s.index) for s in self.samples])
+
+    def _step(self, u: Any, state: Any, blocks: Blocks, count: int) -> Any:
+        bounds = tuple(map(jax.numpy.asarray, self.bounds))
+        return step(self.clock, u, state, bounds, self.start, blocks, np.int32(count), free=self.free, solver=self.solver)
+
+    def _descend(
+        self, u: np.ndarray, count: int, most: int, stage: str, start: int
+    ) -> tuple[np.ndarray, float, bool, np.ndarray]:
+        """Run the solver from `u` on the first `count` blocks; returns the point, its cost, whether it converged, and J^T J."""
+        u = jax.numpy.asarray(u, float)
+        state = initial(u, self.solver)
+        scale = max(self.brightness[:count].sum(), 1e-30)
+        for k in range(most):
+            u, state = self._step(u, state, self.blocks, count)
+            error = float(np.sqrt(2.0 * state.loss / scale))
+            self.trace.append(Row(time.perf_counter() - self.began, stage, start, k, error))
+            if bool(state.done):
+                break
+        return np.asarray(u), float(state.loss), bool(state.done) and bool(np.isfinite(float(state.loss))), np.asarray(state.gram)
+
+    def _drop_blind(self, origin: np.ndarray) -> None:
+        """Hold what has no effect on these images, with a reason; a parameter that the user asked for by name is an error."""
+        at = jax.numpy.asarray(origin)
+        _, state = self._step(at, initial(at, self.solver), self.blocks, self.layout.used)
+        if not np.isfinite(float(state.loss)):
+            raise InputError(f"{self.where}: the start gives no finite image; choose other values in [material]")
+        effect = np.sqrt(np.diag(np.asarray(state.gram)))
+        blind = [f for f in self.free.free if np.all(effect[list(f.slots)] <= 1e-7 * effect.max())]
+        if not blind:
+            return
+        names = [f.name for f in blind]
+        if self.explicit:
+            raise InputError(
+                f"{self.where}.free: {', '.join(names)} has no effect on this image at its start; leave it out, or start where it shows "
+                "(a base below an opaque coat does not)"
+            )
+        self.notes += [f"{name} has no effect on this image and was held at its start" for name in names]
+        left = [f.name for f in self.free.free if f.name not in names]
+        self.start, self.free = parametrise(self.start, left, (), self.where)
+        self._set_bounds()
+
+    def _search(self, origin: np.ndarray) -> list[Minimum]:
+        """Minima of the coarse fit, best first: from the given start and from space-filling ones."""
+        found = []
+        points = [origin, *_space_filling(self.free, origin, self.starts - 1, self.seed)]
+        for k, point in enumerate(points):
+            u, cost, _, _ = self._descend(point, 1, COARSE_STEPS, "coarse", k)
+            found.append(Minimum(k, u, cost if np.isfinite(cost) else np.inf))
+            self.progress("coarse", (k + 1) / len(points))
+        found.sort(key=lambda m: m.cost)
+        polished = []
+        for minimum in found[:3]:
+            u, cost, _, _ = self._descend(minimum.vector, 1, FINE_STEPS, "polish", minimum.start)
+            polished.append(Minimum(minimum.start, u, cost))
+        return sorted(polished, key=lambda m: m.cost) + found[3:]
+
+    def _parts(self, u: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Gradient and J^T J of parts of the image: sectors around the highlight, each with a share of every half angle."""
+        sector = self.layout.scatter([_sectors(samples, GROUPS) for samples in self.samples], -1.0)
+        at = jax.numpy.asarray(u)
+        parts = []
+        for g in range(GROUPS):
+            weight = np.where(sector[..., None] == g, self.blocks.inverse_sigma, 0.0)
+            blocks = jax.device_put(dataclasses.replace(self.blocks, inverse_sigma=np.asarray(weight)))
+            _, state = self._step(at, initial(at, self.solver), blocks, self.layout.used)
+            parts.append((np.asarray(state.gradient), np.asarray(state.gram)))
+        return parts
+
+
+def _without_gauge(start: Stack, free: Sequence[str] | None) -> tuple[Sequence[str] | None, list[Held]]:
+    """Hold the thickness of a coat whose absorption is fitted too: images see their product alone, whatever the thicknesses."""
+    held = []
+    for layer in start.layers:
+        absorption, thickness = f"{layer.name}.absorption_per_mm", f"{layer.name}.thickness_um"
+        if free is not None and absorption in free and thickness in free:
+            free = [name for name in free if name != thickness]
+            why = f"absorption and thickness enter only as tau, their product; {thickness} was held at its start"
+            held.append(Held({absorption: 1.0, thickness: -1.0}, why))
+    return free, held
+
+
+def _chosen(view: View, views: int, seed: int) -> np.ndarray:
+    """Pixels of a reference that the fit uses: all, or as many as it can afford, at random."""
+    lights = 1 if view.exact else 992
+    most = max(128, min(PIXELS, EVALUATIONS // lights if lights > 1 else PIXELS) // views)
+    total = len(view.index)
+    if total <= most:
+        return np.arange(total)
+    return np.sort(np.random.default_rng(seed).choice(total, most, replace=False))
+
+
+def _sectors(samples: Samples, count: int) -> np.ndarray:
+    """Sector of each pixel by its angle around the smallest half angle in the image."""
+    wi = samples.wi[np.arange(len(samples.index)), np.argmax(samples.weight.sum(-1), 1)]
+    h = wi + samples.wo
+    peak = samples.index[np.argmin(np.hypot(h[:, 0], h[:, 1]) / np.maximum(h[:, 2], 1e-6))]
+    y, x = np.divmod(samples.index, samples.shape[1])
+    y0, x0 = divmod(int(peak), samples.shape[1])
+    turn = np.arctan2(y - y0, x - x0) / (2.0 * np.pi) + 0.5
+    rank = np.argsort(np.argsort(turn))  # equal numbers of pixels, however the highlight lies
+    return (rank * count // len(rank)).astype(np.float32)
+
+
+def _scales(views: Sequence[View], start: Stack) -> np.ndarray | None:
+    names = [layer.name for layer in start.layers]
+    for view in views:
+        for name in view.reference.thickness_scale:
+            if name not in names:
+                raise InputError(f"{view.reference.exr}: thickness_scale names {name!r}; the coats are {', '.join(names) or 'none'}")
+    scales = [view.scales(start) for view in views]
+    if all(scale is None for scale in scales):
+        return None
+    return np.array([np.ones(len(names)) if scale is None else scale for scale in scales])
+
+
+def _space_filling(free: Parametrisation, origin: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
+    """Starts spread evenly over the middle of the bounds (R sequence, Roberts 2018); channels of a colour move together."""
+    d = len(free.free)
+    g = 2.0
+    for _ in range(64):
+        g = (1.0 + g) ** (1.0 / (d + 1))
+    lower, upper = free.bounds()
+    points = []
+    for k in range(count):
+        x = (0.5 + (k + 1 + seed) * g ** -np.arange(1, d + 1)) % 1.0
+        u = origin.copy()
+        for place, f in zip(x, free.free, strict=True):
+            for slot in f.slots:
+                low, high = _plausible(f.spec.scale, lower[slot], upper[slot])
+                u[slot] = low + place * (high - low)
+        points.append(u)
+    return points
+
+
+def _plausible(scale: str, lower: float, upper: float) -> tuple[float, float]:
+    """The middle of a range, where materials are: the rest is reached from there."""
+    width = upper - lower
+    return (lower + 0.4 * width, upper - 0.05 * width) if scale == "log" else (lower + 0.1 * width, lower + 0.6 * width)

@@ -1,0 +1,146 @@
+"""The solver: Levenberg-Marquardt of optimistix on normal equations with the structure of a material. The only file with optimistix.
+
+A fit has few parameters and many residuals, and channel c of a residual depends on channel c of a colour only. So one `jax.jvp`
+a field (a scalar, or a colour with all its channels at once) gives every column that there is, and the normal equations are
+accumulated from the columns without a tall matrix ever being factored: 4 to 10 times faster than the default. Sums are float64.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import lineax as lx
+import optimistix as optx
+from jaxtyping import Array, Float, PyTree
+
+Normal = tuple[Float[Array, ""], tuple[Float[Array, " n"], Float[Array, "n n"]]]
+"""Half the sum of squares, its gradient, and J^T J."""
+
+
+def normal_equations(residual: Callable[[list[Any]], Any], fields: list[Any], slots: tuple[tuple[int, ...], ...]) -> Normal:
+    """Half the sum of squares of `residual(fields)`, its gradient and J^T J, in float64.
+
+    `residual` maps fields, each a scalar or one value a channel, to (pixels, channels); its channel c must depend on channel c of
+    a colour only. `slots` are the places of each field's entries in the vector of parameters.
+    """
+    columns = []
+    for k, value in enumerate(fields):
+        moved = lambda x, k=k: residual([*fields[:k], x, *fields[k + 1 :]])  # noqa: E731
+        r, column = jax.jvp(moved, (value,), (jnp.ones_like(value),))
+        columns.append(column)
+    over_pixels = lambda x: jnp.sum(x, 0, dtype=jnp.float64)  # noqa: E731
+    size = sum(len(s) for s in slots)
+    gradient = jnp.zeros(size)
+    gram = jnp.zeros((size, size))
+    for k, (a, at) in enumerate(zip(columns, slots, strict=True)):
+        gradient = gradient.at[jnp.array(at)].set(_entries(over_pixels(a * r), len(at) > 1))
+        for b, bt in zip(columns[: k + 1], slots[: k + 1], strict=True):
+            block = _block(over_pixels(a * b), len(at) > 1, len(bt) > 1)
+            gram = gram.at[jnp.ix_(jnp.array(at), jnp.array(bt))].set(block)
+            gram = gram.at[jnp.ix_(jnp.array(bt), jnp.array(at))].set(block.T)
+    return 0.5 * jnp.sum(r * r, dtype=jnp.float64), (gradient, gram)
+
+
+def _entries(channels: Any, colour: bool) -> Any:
+    return channels if colour else jnp.sum(channels)[None]
+
+
+def _block(channels: Any, colour_row: bool, colour_column: bool) -> Any:
+    if colour_row and colour_column:
+        return jnp.diag(channels)
+    if colour_row or colour_column:
+        return channels[:, None] if colour_row else channels[None, :]
+    return jnp.sum(channels)[None, None]
+
+
+class _State(eqx.Module):
+    first: Any
+    y_eval: Any
+    loss: Any
+    gradient: Any
+    gram: Any
+    search: Any
+    step_size: Any
+    done: Any
+    result: Any
+
+
+class NormalLevenbergMarquardt(optx.AbstractMinimiser):
+    """Levenberg-Marquardt for a function that returns its loss and, as auxiliary output, gradient and J^T J.
+
+    Optimistix's trust region and damped Newton descent, in coordinates scaled by the diagonal of J^T J (Marquardt 1963) so that the
+    units of the parameters do not matter. Bounds, `options["lower"]` and `options["upper"]`, always hold: a step is clipped
+    to them, and a parameter on its bound that the gradient pushes outwards sits out.
+    """
+
+    rtol: float = 1e-5
+    atol: float = 1e-6
+    norm: Callable[[PyTree], Any] = optx.max_norm
+    descent: optx.AbstractDescent = optx.DampedNewtonDescent(linear_solver=lx.Cholesky())
+    search: optx.AbstractSearch = optx.ClassicalTrustRegion()
+
+    def init(self, fn, y, args, options, f_struct, aux_struct, tags):  # noqa: D102
+        n = y.size
+        empty = self._info(jnp.zeros(()), jnp.zeros(n), jnp.eye(n))
+        zero = jnp.zeros(())
+        return _State(
+            first=jnp.array(True),
+            y_eval=y,
+            loss=zero,
+            gradient=jnp.zeros(n),
+            gram=jnp.eye(n),
+            search=self.search.init(y, empty),
+            step_size=jnp.ones(()),
+            done=jnp.array(False),
+            result=optx.RESULTS.successful,
+        )
+
+    def step(self, fn, y, args, options, state, tags):  # noqa: D102
+        lower, upper = options["lower"], options["upper"]
+        loss, (gradient, gram) = fn(state.y_eval, args)
+        # A trial that is not finite is a trial that failed: the trust region shrinks.
+        loss = jnp.where(jnp.isfinite(loss) & jnp.all(jnp.isfinite(gram)), loss, jnp.inf)
+        before = self._info(state.loss, state.gradient, state.gram)
+        trial = self._info(loss, gradient, gram)
+        step_size, accept, result, search = self.search.step(state.first, y, state.y_eval, before, trial, state.search)
+        moved = jnp.abs(state.y_eval - y)
+        small = jnp.all(moved <= self.atol + self.rtol * jnp.abs(y))
+        gained = state.loss - loss
+        done = accept & ~state.first & small & (gained <= self.rtol * state.loss)
+        y = jnp.where(accept, state.y_eval, y)
+        loss, gradient, gram = (
+            jnp.where(accept, new, old)
+            for new, old in ((loss, state.loss), (gradient, state.gradient), (gram, state.gram))
+        )
+        # Nothing left to gain: float32 residuals cannot show a smaller step, or the start was not finite.
+        stuck = (step_size < 1e-9) | (state.first & ~jnp.isfinite(loss))
+        held = ((y <= lower) & (gradient > 0.0)) | ((y >= upper) & (gradient < 0.0))
+        y_eval = jnp.clip(y + self._descend(gradient, gram, held, step_size), lower, upper)
+        done = done | stuck | jnp.all(held)
+        state = _State(jnp.array(False), y_eval, loss, gradient, gram, search, step_size, done, result)
+        return y, state, (gradient, gram)
+
+    def _info(self, loss, gradient, gram):
+        operator = lx.MatrixLinearOperator(gram, lx.positive_semidefinite_tag)
+        return optx.FunctionInfo.EvalGradHessian(loss, gradient, operator)
+
+    def _descend(self, gradient, gram, held, step_size):
+        """One damped step of the parameters that are not held, in scaled coordinates."""
+        diagonal = jnp.diagonal(gram)
+        # A parameter with no effect has no scale of its own; it stays where it is.
+        floor = 1e-14 * jnp.max(diagonal)
+        scale = jnp.where(held | (diagonal <= floor), 0.0, 1.0 / jnp.sqrt(jnp.maximum(diagonal, floor)))
+        scaled = gram * scale[:, None] * scale[None, :]
+        scaled = scaled + jnp.diag(jnp.where(scale > 0.0, 1e-12, 1.0))
+        info = self._info(jnp.zeros(()), gradient * scale, scaled)
+        state = self.descent.query(gradient, info, self.descent.init(gradient, info))
+        step, _ = self.descent.step(step_size, state)
+        return jnp.nan_to_num(step) * scale
+
+    def terminate(self, fn, y, args, options, state, tags):  # noqa: D102
+        return state.done, state.result
+
+    def postprocess(self, fn, y, aux, args, options, state, tags, result):  # noqa: D102
+        return y, aux, {}

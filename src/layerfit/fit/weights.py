@@ -1,0 +1,49 @@
+"""How much a pixel counts: the inverse of what its residual may be, as a smooth law of the MODEL's value.
+
+Never the noise of the pixel itself: in a path-traced image a pixel that is too bright by chance also shows a large standard error,
+so that weights made from it, and robust losses on it, pull the fit down. The law has three parts: noise, fitted to the file's
+standard errors where it has them; a share of the value, for what no closed form gets right; and a share of the image's brightness.
+"""
+
+import numpy as np
+
+MODEL_SHARE = 0.05
+"""Relative error that is expected of any closed form below a coat."""
+
+FLOOR_SHARE = 0.02
+"""Part of the 98th percentile below which a pixel says little: bounces and leaks that no form models live there."""
+
+NOISE_EXPONENT = 0.7
+"""Monte Carlo noise of a radiance f grows like f^.7 in renders of coated spheres."""
+
+
+def inverse_sigma(model: np.ndarray, target: np.ndarray, noise: np.ndarray | None, kind: str) -> np.ndarray:
+    """Weight of each residual, (pixels, 3), from the model's values there. `kind` is "law" or "uniform"."""
+    bright = np.maximum(np.quantile(target, 0.98, axis=0), 1e-12 + 1e-3 * np.quantile(target, 0.98))
+    if kind == "uniform":
+        return np.broadcast_to(1.0 / bright, target.shape).astype(np.float32)
+    model = np.maximum(model, 0.0)
+    variance = (MODEL_SHARE * model) ** 2 + (FLOOR_SHARE * bright) ** 2
+    if noise is not None:
+        variance = variance + noise_law(model, noise) ** 2
+    return (1.0 / np.sqrt(variance)).astype(np.float32)
+
+
+def noise_law(model: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Standard error of a pixel of this model value, c f^.7, with c the median over the pixels."""
+    power = np.maximum(model, 1e-12) ** NOISE_EXPONENT
+    known = np.isfinite(noise) & (noise > 0.0)
+    if not known.any():
+        return np.zeros_like(model)
+    return np.median((noise / power)[known]) * power
+
+
+def robust(residual: np.ndarray, loss: str) -> np.ndarray:
+    """Factor on the weights of one round of iteratively reweighted least squares; residuals in units of their sigma."""
+    scale = 1.4826 * np.median(np.abs(residual)) + 1e-30
+    size = np.abs(residual) / scale
+    if loss == "huber":
+        return np.sqrt(1.345 / np.maximum(size, 1.345)).astype(np.float32)
+    if loss == "cauchy":
+        return (1.0 / np.sqrt(1.0 + (size / 2.385) ** 2)).astype(np.float32)
+    return np.ones_like(residual, np.float32)

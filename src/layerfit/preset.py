@@ -1,0 +1,184 @@
+"""Presets: a material as data, one JSON document (or the same blocks in a scene file).
+
+Layers outermost first; keys are the fields of the layers, so that ranges, units and meanings are written once. Unknown keys
+are errors that name the nearest known one.
+"""
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ._fields import Param, params
+from .errors import InputError
+from .forms.corrected import Corrected
+from .forms.faithful import Faithful
+from .layers import LAYERS
+from .stack import Stack
+from .surfaces import BASES
+from .documents import check_keys, nearest, read_document, write_text
+
+SCHEMA = "layerfit/preset"
+VERSION = 1
+MODELS: dict[str, type] = {"corrected": Corrected, "faithful": Faithful}
+_STACK_KEYS = ("model", "options", "layers", "base")
+_PRESET_KEYS = ("schema", "version", "name", *_STACK_KEYS, "left_out", "fit")
+
+
+def read_preset(path: Path) -> Stack:
+    """The material of a preset file. Raises `InputError` that says which key is wrong and what was meant."""
+    document = read_document(path)
+    where = str(path)
+    if document.get("schema") != SCHEMA:
+        raise InputError(f'{where}: not a preset: "schema" is {document.get("schema")!r} and should be {SCHEMA!r}')
+    if document.get("version") != VERSION:
+        raise InputError(
+            f"{where}: preset version {document.get('version')!r}; this layerfit reads version {VERSION}. "
+            "A newer layerfit reads newer presets."
+        )
+    check_keys(document, _PRESET_KEYS, where)
+    return stack_of({key: document[key] for key in _STACK_KEYS if key in document}, where)
+
+
+def preset_of(stack: Stack, name: str, **more: Any) -> dict[str, Any]:
+    """The preset document of a material."""
+    document: dict[str, Any] = {"schema": SCHEMA, "version": VERSION, "name": name, "model": model_name(stack)}
+    changed = {
+        field.name: getattr(stack.form, field.name)
+        for field in dataclasses.fields(stack.form)
+        if getattr(stack.form, field.name) != field.default
+    }
+    if changed:
+        document["options"] = changed
+    document["layers"] = [_layer_document(layer, LAYERS) for layer in stack.layers]
+    document["base"] = _layer_document(stack.base, BASES)
+    document["left_out"] = left_out(stack)
+    return document | more
+
+
+def write_preset(path: Path, stack: Stack, name: str, **more: Any) -> None:
+    """Write a preset file, whole or not at all."""
+    write_text(path, json.dumps(preset_of(stack, name, **more), indent=2) + "\n")
+
+
+def model_name(stack: Stack) -> str:
+    """Name of the form in presets and reports."""
+    return next(name for name, form in MODELS.items() if isinstance(stack.form, form))
+
+
+def left_out(stack: Stack) -> list[str]:
+    """What this material does without, in words: none of it is evaluated, fitted or printed."""
+    words = []
+    if not stack.layers:
+        words.append("coat")
+    for layer in stack.layers:
+        if layer.optical_depth is None:
+            words.append(f"{layer.name}: absorption")
+    for layer in (*stack.layers, stack.base):
+        if getattr(layer, "alpha", None) is not None:
+            words.append(f"{layer.name}: anisotropy")
+    return words
+
+
+def stack_of(document: Mapping[str, Any], where: str) -> Stack:
+    """The material of `model`, `options`, `layers` and `base` keys; `where` is named in messages."""
+    check_keys(document, _STACK_KEYS, where)
+    model = document.get("model", "corrected")
+    if model not in MODELS:
+        raise InputError(f"{where}: model = {model!r} is not one of {', '.join(MODELS)}{nearest(str(model), MODELS)}")
+    form = MODELS[model]
+    options = document.get("options", {})
+    check_keys(options, [f.name for f in dataclasses.fields(form)], f"{where}: options")
+    layers = document.get("layers", [])
+    if not isinstance(layers, Sequence) or isinstance(layers, str):
+        raise InputError(f"{where}: layers should be a list, outermost first")
+    if "base" not in document:
+        raise InputError(f'{where}: there is no base; give one, for example {{"type": "conductor", "alpha": 0.2}}')
+    built = tuple(_layer(layer, LAYERS, f"{where}: layers[{k}]") for k, layer in enumerate(layers))
+    base = _layer(document["base"], BASES, f"{where}: base")
+    names = [layer.name for layer in (*built, base)]
+    if len(set(names)) < len(names):
+        raise InputError(f"{where}: two layers share a name ({', '.join(names)}); names tell parameters apart")
+    return Stack(built, base, form(**options))
+
+
+def _layer(document: Any, kinds: Mapping[str, type], where: str) -> Any:
+    if not isinstance(document, Mapping):
+        raise InputError(f"{where}: should be a table of keys, not {document!r}")
+    kind = document.get("type")
+    if kind not in kinds:
+        raise InputError(f"{where}: type = {kind!r} is not one of {', '.join(kinds)}{nearest(str(kind), kinds)}")
+    cls = kinds[kind]
+    known = {field.name: field for field in dataclasses.fields(cls)}
+    check_keys(document, ("type", *known), where)
+    specs = dict(params(cls))
+    values: dict[str, Any] = {}
+    for key, value in document.items():
+        if key == "type":
+            continue
+        if key in specs:
+            values[key] = _number(value, specs[key], f"{where}.{key}")
+        else:
+            values[key] = _choice(value, known[key], f"{where}.{key}")
+    if ("alpha_x" in values) != ("alpha_y" in values):
+        raise InputError(f"{where}: alpha_x and alpha_y come together; one is missing")
+    if "alpha_x" in values:
+        if "alpha" in values:
+            raise InputError(f"{where}: give either alpha, or alpha_x and alpha_y")
+        values["alpha"] = None
+    if ("absorption_per_mm" in values) != ("thickness_um" in values):
+        raise InputError(f"{where}: absorption_per_mm and thickness_um come together; where neither is known give their product tau")
+    if "tau" in values and "absorption_per_mm" in values:
+        raise InputError(f"{where}: give either tau, or absorption_per_mm and thickness_um; tau is their product")
+    return cls(**values)
+
+
+def _number(value: Any, spec: Param, where: str) -> Any:
+    array = np.asarray(value, object)
+    numeric = all(isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v) for v in array.ravel())
+    if not numeric or array.shape not in ((), (3,)):
+        raise InputError(f"{where} = {value!r}: should be a finite number{' or a list of three' if spec.colour else ''}")
+    if array.shape == (3,) and not spec.colour:
+        raise InputError(f"{where} = {value!r}: is one number for all channels, not a colour")
+    array = array.astype(float)
+    if np.any(array < spec.lower) or np.any(array > spec.upper):
+        raise InputError(f"{where} = {value!r}: outside its range {spec.lower:g} to {spec.upper:g} {_unit(spec)}({spec.doc})")
+    return float(array) if array.shape == () else array
+
+
+def _unit(spec: Param) -> str:
+    return "" if spec.unit == "1" else f"{spec.unit} "
+
+
+def _choice(value: Any, field: dataclasses.Field[Any], where: str) -> str:
+    choices = field.metadata.get("choices")
+    if choices and value not in choices:
+        raise InputError(f"{where} = {value!r}: should be one of {', '.join(choices)}{nearest(str(value), choices)}")
+    if not choices and not (isinstance(value, str) and value.isidentifier() and value.isascii() and len(value) <= 32):
+        raise InputError(f"{where} = {value!r}: a name is up to 32 letters, digits and underscores, the first a letter")
+    return value
+
+
+def _layer_document(layer: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
+    kind = next(name for name, cls in kinds.items() if isinstance(layer, cls))
+    document: dict[str, Any] = {"type": kind, "name": layer.name}
+    for field in dataclasses.fields(layer):
+        value = getattr(layer, field.name)
+        if field.name == "name" or value is None:
+            continue
+        if "param" in field.metadata:
+            document[field.name] = rounded(value)
+        elif value != field.default:
+            document[field.name] = value
+    return document
+
+
+def rounded(value: Any) -> Any:
+    """A number or a colour for a document: as many digits as float32 holds."""
+    array = np.asarray(value, np.float32)
+    return float(str(array)) if array.shape == () else [float(str(v)) for v in array]
+

@@ -1,0 +1,140 @@
+"""A material as a shader: the traced functions in the template of `shaders/`, with the fitted values as constants or uniforms."""
+
+import dataclasses
+import re
+from functools import cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .. import __version__
+from .._chunk import CHUNKS
+from .._data import shaders
+from .._fields import params
+from ..preset import left_out, model_name
+from ..stack import Stack, evaluate
+from .printer import PREFIX, Printer
+
+HEADERS = {
+    "glsl330": "#version 330 core",
+    "essl300": "#version 300 es\nprecision highp float;\nprecision highp int;",
+}
+"""First lines of a shader for each target."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Shader:
+    """A printed material."""
+
+    name: str
+    stack: Stack
+    functions: str
+    """Structs, constants and functions, up to `vec3 lf_brdf(...)`; complete without anything else."""
+    uniforms: dict[str, Any]
+    """Values of the uniforms, by name; empty where values are constants."""
+
+    @property
+    def anisotropic(self) -> bool:
+        """Whether the BRDF asks for a tangent."""
+        return any(getattr(layer, "alpha_x", None) is not None for layer in (*self.stack.layers, self.stack.base))
+
+    def text(self, target: str = "glsl330", file: str = "material.frag") -> str:
+        """The whole fragment shader: a template of `shaders/` with this material in its slots."""
+        slots = {
+            "header": HEADERS[target],
+            "about": self._about(),
+            "material": self.functions,
+            "lights": template("lights.glsl", self.anisotropic),
+            "output": template("output.glsl", self.anisotropic),
+        }
+        frame = "vec3 n, vec3 t, vec3 v, vec3 l" if self.anisotropic else "vec3 n, vec3 v, vec3 l"
+        text = template(file, self.anisotropic).replace("@FRAME@", frame)
+        return re.sub(r"^//@ (\w+)$", lambda slot: slots[slot[1]].rstrip("\n"), text, flags=re.M)
+
+    def _about(self) -> str:
+        layers = " over ".join(type(layer).__name__ for layer in (*self.stack.layers, self.stack.base))
+        lines = [
+            f"{self.name}: {layers}.",
+            f"Printed by layerfit {__version__} from its {model_name(self.stack)} form.",
+            f"Left out, because this material does without: {', '.join(left_out(self.stack)) or 'nothing'}.",
+        ]
+        return "\n".join(f"// {line}" for line in lines)
+
+
+def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
+    """Print a material: its values as constants, or as uniforms `u_LAYER_FIELD` from which the shader computes its constants."""
+    stack = stack.astype(jnp.float32)
+    printer = Printer(CHUNKS)
+    w = jnp.array([0.0, 0.0, 1.0], jnp.float32)
+    if uniforms:
+        given = _uniforms(stack)
+        declarations = "".join(f"uniform {kind} {name};  // {note}\n" for _, name, kind, note in given)
+        values = {name: np.asarray(leaf) for leaf, name, _, _ in given}
+        structure = jax.tree.structure(stack)
+
+        def local(*args: Any) -> Any:
+            live: Stack = jax.tree.unflatten(structure, args[:-2])
+            return jnp.broadcast_to(evaluate(live.form, live.prepare(), *args[-2:]), (3,))
+
+        outside = [(leaf, name) for leaf, name, _, _ in given]
+    else:
+        prepared = jax.tree.map(np.asarray, jax.jit(Stack.prepare)(stack))
+        outside = [(part, f"{PREFIX}{name}") for name, part in _parts(stack, prepared)]
+        declarations = "\n".join(printer.constant(name, part) for part, name in outside)
+        values = {}
+        structure = jax.tree.structure(prepared)
+
+        def local(*args: Any) -> Any:
+            live = jax.tree.unflatten(structure, jax.tree.leaves(args[:-2]))
+            return jnp.broadcast_to(evaluate(stack.form, live, *args[-2:]), (3,))
+
+    local.__doc__ = "BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine."
+    printer.function(local, f"{PREFIX}evaluate", outside, [(w, "wi"), (w, "wo")])
+    shader = Shader(name, stack, "", values)
+    frame = template("brdf.glsl", shader.anisotropic)
+    functions = "\n".join(part for part in (printer.structs_text(), declarations, printer.functions_text(), frame) if part)
+    return dataclasses.replace(shader, functions=functions)
+
+
+def _parts(stack: Stack, prepared: Any) -> list[tuple[str, Any]]:
+    """The constants of a prepared material, by the names of the layers that they belong to, in the order of its leaves."""
+    if prepared is None or not stack.layers:
+        return [(stack.base.name, prepared)]
+    parts: list[tuple[str, Any]] = []
+    for field in dataclasses.fields(prepared):
+        value = getattr(prepared, field.name)
+        if isinstance(value, tuple):
+            for layer, item in zip(stack.layers, value, strict=True):
+                own = isinstance(item, type(layer))
+                parts.append((layer.name if own else f"{layer.name}_{type(item).__name__.lower()}", item))
+        elif dataclasses.is_dataclass(value):
+            parts.append((stack.base.name, value))
+        elif value is not None:
+            parts.append((f"{stack.base.name}_{field.name}", value))
+    return parts
+
+
+def _uniforms(stack: Stack) -> list[tuple[Any, str, str, str]]:
+    """Every number of the material as (value, uniform, type, comment), in the order of its leaves."""
+    rows = []
+    for layer in (*stack.layers, stack.base):
+        for field, spec in params(layer):
+            value = getattr(layer, field)
+            if value is not None:
+                note = f"{spec.doc}, {spec.lower:g} to {spec.upper:g} {'' if spec.unit == '1' else spec.unit}".rstrip()
+                rows.append((value, f"u_{layer.name}_{field}", "vec3" if value.ndim else "float", note))
+    return rows
+
+
+@cache
+def template(file: str, anisotropic: bool) -> str:
+    """A file of `shaders/` with its conditional parts chosen."""
+    text = (shaders() / file).read_text()
+
+    def choose(match: re.Match[str]) -> str:
+        yes, _, no = match[2].partition("//@ else\n")
+        return yes if anisotropic else no
+
+    return re.sub(r"^//@ if (anisotropic)\n(.*?)^//@ end\n", choose, text, flags=re.M | re.S)

@@ -1,0 +1,103 @@
+"""Is the shader the material? The printed functions rendered in OpenGL, compared with JAX number by number."""
+
+import dataclasses
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..stack import Stack, evaluate
+from .export import Shader
+from .gl import renderer, shade_points
+
+MAX_REL = 5e-5
+P999_REL = 1e-5
+"""What printed float32 arithmetic may differ by: rounding, and a driver's exp that is 17 units in the last place off."""
+
+FLOOR = 1e-4
+"""Values below this part of a lit diffuse surface (for images: of white) are compared absolutely."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Parity:
+    """Shader against JAX, same material, same inputs: relative to the larger of the value and the floor."""
+
+    max_rel: float
+    p999_rel: float
+    worst: dict[str, Any]
+    count: int
+    renderer: str
+
+    @property
+    def passed(self) -> bool:
+        return self.max_rel <= MAX_REL and self.p999_rel <= P999_REL
+
+    def to_json(self) -> dict[str, Any]:
+        return {"max_rel": self.max_rel, "p999_rel": self.p999_rel, "worst": self.worst, "values": self.count}
+
+
+def compare(shader: np.ndarray, model: np.ndarray, floor: float, describe: Any = lambda row: {}) -> Parity:
+    """Parity of values (n, 3); `describe` adds what is known of the worst row to the report."""
+    difference = np.abs(shader.astype(float) - model) / np.maximum(np.abs(model), floor)
+    difference = np.where(np.isfinite(shader) & np.isfinite(model), difference, np.inf)
+    row, channel = np.unravel_index(np.argmax(difference), difference.shape)
+    worst = {"channel": "rgb"[channel], "shader": float(shader[row, channel]), "jax": float(model[row, channel])}
+    return Parity(
+        float(difference.max()),
+        float(np.quantile(difference, 0.999)),
+        describe(int(row)) | worst,
+        int(difference.size),
+        renderer(),
+    )
+
+
+def shade_samples(shader: Shader, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Pixels (n, 3) that the printed functions make of samples: wi and weight (n, samples, 3), wo (n, 3)."""
+    attributes = {"v_wi": np.swapaxes(wi, 0, 1), "v_wo": wo, "v_weight": np.swapaxes(weight, 0, 1)}
+    return shade_points(shader.text(file="samples.frag"), attributes, shader.uniforms)
+
+
+def check_image(image: np.ndarray, model: np.ndarray, index: np.ndarray, width: int) -> Parity:
+    """Parity of an image's pixels (n, 3) with what JAX computed for them; `index` is their row-major place."""
+    floor = FLOOR * float(np.quantile(np.max(model, -1), 0.99))
+    return compare(image, model, floor, lambda row: {"x": int(index[row] % width), "y": int(index[row] // width)})
+
+
+def check_pairs(shader: Shader, count: int = 65536, seed: int = 0) -> Parity:
+    """Parity of the BRDF on random and extreme pairs of directions."""
+    wi, wo = random_pairs(count, seed)
+    model = np.asarray(_brdf(shader.stack.astype(jnp.float32), wi, wo))
+    values = shade_samples(shader, wi[:, None], wo, np.ones_like(wi)[:, None])
+    describe = lambda row: {"wi": wi[row].tolist(), "wo": wo[row].tolist()}  # noqa: E731
+    return compare(values, model, FLOOR / np.pi, describe)
+
+
+@jax.jit
+def _brdf(stack: Stack, wi: Any, wo: Any) -> Any:
+    one = partial(evaluate, stack.form, stack.prepare())
+    return jax.vmap(lambda i, o: jnp.broadcast_to(one(i, o), (3,)))(wi, wo)
+
+
+def random_pairs(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of unit directions above the surface, float32: uniform ones, mirror and retro pairs with small offsets, grazing ones."""
+    rng = np.random.default_rng(seed)
+    sixth = count // 6
+
+    def directions(n: int, cosine: np.ndarray) -> np.ndarray:
+        phi = rng.uniform(0.0, 2.0 * np.pi, n)
+        sine = np.sqrt((1.0 - cosine) * (1.0 + cosine))
+        return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], -1)
+
+    grazing = lambda n: 10.0 ** rng.uniform(-4.0, -1.0, n)  # noqa: E731
+    uniform = lambda n: rng.uniform(1e-3, 1.0, n)  # noqa: E731
+    wi = np.concatenate([directions(count - 2 * sixth, uniform(count - 2 * sixth)), directions(2 * sixth, grazing(2 * sixth))])
+    wo = np.concatenate([directions(count - sixth, uniform(count - sixth)), directions(sixth, grazing(sixth))])
+    near = slice(0, 2 * sixth)
+    offset = rng.normal(size=(2 * sixth, 3)) * 10.0 ** rng.uniform(-3.0, -0.5, (2 * sixth, 1))
+    flip = np.where(np.arange(2 * sixth) % 4 == 0, 1.0, -1.0)[:, None] * np.array([1.0, 1.0, 0.0]) + np.array([0.0, 0.0, 1.0])
+    wo[near] = wi[near] * flip + offset
+    wo[:, 2] = np.maximum(np.abs(wo[:, 2]), 1e-4)
+    wo /= np.linalg.norm(wo, axis=-1, keepdims=True)
+    return wi.astype(np.float32), wo.astype(np.float32)

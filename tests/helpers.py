@@ -1,0 +1,149 @@
+"""Cases and tolerances that several tests share.
+
+Tolerances of physics: relative to the value, absolute below a floor. float64 is held against 50-digit values. float32 is held
+against float64 at the SAME rounded inputs: an index of 1.0001 loses three digits of its distance from 1 when it is rounded, which no
+formula can give back.
+"""
+
+import functools
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from layerfit.forms.corrected import Corrected
+from layerfit.forms.faithful import Faithful
+from layerfit.layers import Coat
+from layerfit.stack import Stack, evaluate
+from layerfit.surfaces import Conductor, Dielectric, Lambert, OrenNayar
+
+REL = {np.float64: 1e-12, np.float32: 1e-5}
+FLOOR = {np.float64: 1e-13, np.float32: 1e-6}
+
+COPPER = {"eta": [0.201, 0.924, 1.102], "k": [3.913, 2.453, 2.142]}
+
+
+@functools.cache
+def cases(oracle: Path) -> dict[str, list[dict[str, Any]]]:
+    """50-digit cases by the name of their formula."""
+    by_name: dict[str, list[dict[str, Any]]] = {}
+    for case in json.loads((oracle / "cases.json").read_text())["cases"]:
+        by_name.setdefault(case["fn"], []).append(case)
+    return by_name
+
+
+def close(value: float, wanted: float, rel: float, floor: float) -> bool:
+    """Within `rel` of the value, or of the floor where the value is smaller."""
+    return bool(abs(value - wanted) <= rel * max(abs(wanted), floor / rel))
+
+
+def _width(layer: Mapping[str, Any]) -> dict[str, Any]:
+    if layer["ax"] == layer["ay"]:
+        return {"alpha": layer["ax"]}
+    return {"alpha": None, "alpha_x": layer["ax"], "alpha_y": layer["ay"]}
+
+
+def surface_of(base: Mapping[str, Any]) -> Any:
+    """The surface of a case."""
+    if base["kind"] == "lambert":
+        return Lambert(albedo=base["rho"])
+    kind = {"distribution": base["ndf"], "masking": base.get("G", "smith")}
+    if base["kind"] == "dielectric":
+        return Dielectric(**_width(base), eta=base["ior"], **kind)
+    return Conductor(**_width(base), eta=base["n"], k=base["k"], **kind)
+
+
+def coat_of(layer: Mapping[str, Any], name: str = "coat") -> Coat:
+    """The coat of a case."""
+    return Coat(
+        name=name,
+        **_width(layer),
+        eta=layer["ior"],
+        tau=layer["alpha"] * layer["d"],
+        distribution=layer["ndf"],
+        masking=layer.get("G", "smith"),
+    )
+
+
+def stack_of(layers: list[Mapping[str, Any]], form: Any) -> Stack:
+    """The stack of a case."""
+    return Stack(tuple(coat_of(layer, f"coat{k}") for k, layer in enumerate(layers[:-1])), surface_of(layers[-1]), form)
+
+
+# Not jitted: chunks are, one by one, and are shared by all materials; compiling every material whole would take minutes.
+def brdf(stack: Stack, wi: Any, wo: Any) -> Any:
+    """BRDF of one pair of directions."""
+    return evaluate(stack.form, stack.prepare(), wi, wo)
+
+
+def brdf_rows(stack: Stack, wi: Any, wo: Any) -> Any:
+    """BRDF (n, 3) of rows of directions."""
+    prepared = stack.prepare()
+    one = lambda i, o: jnp.broadcast_to(evaluate(stack.form, prepared, i, o), (3,))  # noqa: E731
+    return jax.vmap(one)(jnp.asarray(wi), jnp.asarray(wo))
+
+
+def direction(theta_deg: float, phi_deg: float = 0.0) -> np.ndarray:
+    """A unit direction by its angles."""
+    t, p = np.radians([theta_deg, phi_deg])
+    return np.array([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+
+
+def hemisphere(count: int, seed: int = 0) -> np.ndarray:
+    """Directions above the surface (n, 3), uniform in solid angle."""
+    rng = np.random.default_rng(seed)
+    z = rng.uniform(0.02, 1.0, count)
+    phi = rng.uniform(0.0, 2.0 * np.pi, count)
+    s = np.sqrt(1.0 - z * z)
+    return np.stack([s * np.cos(phi), s * np.sin(phi), z], -1)
+
+
+def varnish(**coat: Any) -> Coat:
+    """A coat with all that a coat can have."""
+    return Coat(**({"alpha": 0.1, "eta": 1.5, "tau": [0.05, 0.2, 0.6]} | coat))
+
+
+STACKS: dict[str, Stack] = {
+    "conductor": Stack((), Conductor(alpha=0.2, **COPPER)),
+    "conductor, Beckmann": Stack((), Conductor(alpha=0.2, distribution="beckmann", **COPPER)),
+    "conductor, anisotropic": Stack((), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.35, **COPPER)),
+    "conductor, anisotropic Beckmann": Stack(
+        (), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.35, distribution="beckmann", masking="smith_separable", **COPPER)
+    ),
+    "conductor, V-cavity": Stack((), Conductor(alpha=0.05, masking="vcavity", **COPPER)),
+    "dielectric": Stack((), Dielectric(alpha=0.3, eta=1.5)),
+    "lambert": Stack((), Lambert(albedo=[0.5, 0.28, 0.13])),
+    "oren_nayar": Stack((), OrenNayar(albedo=[0.5, 0.28, 0.13], sigma=0.4)),
+    "oren_nayar, qualitative": Stack((), OrenNayar(albedo=0.5, sigma=0.4, form="qualitative")),
+    "corrected over conductor": Stack((varnish(),), Conductor(alpha=0.2, **COPPER)),
+    "corrected, narrow": Stack((varnish(alpha=0.02),), Conductor(alpha=0.02, **COPPER)),
+    "corrected with trapped light": Stack((varnish(),), Conductor(alpha=0.4, **COPPER), Corrected(trapped=True)),
+    "corrected, clear coat": Stack((varnish(tau=None),), Conductor(alpha=0.2, **COPPER)),
+    "corrected over dielectric": Stack((varnish(),), Dielectric(alpha=0.2, eta=2.2)),
+    "corrected over lambert": Stack((varnish(),), Lambert(albedo=[0.5, 0.28, 0.13])),
+    "corrected over oren_nayar": Stack((varnish(),), OrenNayar(albedo=[0.5, 0.28, 0.13])),
+    "corrected, Beckmann": Stack((varnish(distribution="beckmann"),), Conductor(alpha=0.2, distribution="beckmann", **COPPER)),
+    "corrected, anisotropic": Stack(
+        (varnish(alpha=None, alpha_x=0.05, alpha_y=0.2),), Conductor(alpha=None, alpha_x=0.3, alpha_y=0.1, **COPPER)
+    ),
+    "corrected, three layers": Stack(
+        (varnish(), Coat(name="primer", alpha=0.2, eta=1.35, tau=[0.3, 0.1, 0.2])), Conductor(alpha=0.25, **COPPER)
+    ),
+    "corrected, three layers over lambert": Stack(
+        (varnish(), Coat(name="primer", alpha=0.2, eta=1.7, tau=[0.3, 0.1, 0.2])), Lambert(albedo=[0.5, 0.28, 0.13])
+    ),
+    "corrected, absorption and thickness": Stack(
+        (Coat(alpha=0.1, eta=1.5, absorption_per_mm=[1.0, 4.0, 12.0], thickness_um=50.0),), Conductor(alpha=0.2, **COPPER)
+    ),
+    "faithful over conductor": Stack((varnish(masking="vcavity"),), Conductor(alpha=0.2, **COPPER), Faithful()),
+    "faithful at the normal": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Faithful("n", "n")),
+    "faithful over lambert": Stack((varnish(),), Lambert(albedo=[0.5, 0.28, 0.13]), Faithful()),
+    "faithful, three layers": Stack(
+        (varnish(masking="vcavity"), Coat(name="primer", alpha=0.2, eta=1.35, tau=0.3)), Conductor(alpha=0.25, **COPPER), Faithful()
+    ),
+}
+"""One material of every structure, for tests that all of them must pass."""
