@@ -143,7 +143,9 @@ STACKS: dict[str, Stack] = {
     "faithful at the normal": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Faithful("n", "n")),
     "faithful over lambert": Stack((varnish(),), Lambert(albedo=[0.5, 0.28, 0.13]), Faithful()),
     "faithful, three layers": Stack(
-        (varnish(masking="vcavity"), Coat(name="primer", alpha=0.2, eta=1.35, tau=0.3)), Conductor(alpha=0.25, **COPPER), Faithful()
+        (varnish(masking="vcavity"), Coat(name="primer", alpha=0.2, eta=1.35, tau=0.3)),
+        Conductor(alpha=0.25, **COPPER),
+        Faithful(),
     ),
 }
 """One material of every structure, for tests that all of them must pass."""

@@ -8,8 +8,22 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import COPPER, FLOOR, REL, STACKS, brdf, brdf_rows, cases, close, direction, hemisphere, stack_of, surface_of, varnish
 
+from helpers import (
+    COPPER,
+    FLOOR,
+    REL,
+    STACKS,
+    brdf,
+    brdf_rows,
+    cases,
+    close,
+    direction,
+    hemisphere,
+    stack_of,
+    surface_of,
+    varnish,
+)
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.layers import Coat
@@ -199,7 +213,9 @@ def test_derivatives_agree_with_differences(name):
 
 @pytest.mark.parametrize("form", [Corrected(), Corrected(trapped=True), Faithful(), Faithful("n", "n")], ids=str)
 @pytest.mark.parametrize(
-    "base", [Conductor(alpha=0.3, **COPPER), Lambert(albedo=0.7), OrenNayar(albedo=0.7, sigma=0.3)], ids=lambda b: type(b).__name__
+    "base",
+    [Conductor(alpha=0.3, **COPPER), Lambert(albedo=0.7), OrenNayar(albedo=0.7, sigma=0.3)],
+    ids=lambda b: type(b).__name__,
 )
 def test_a_coat_that_is_not_there_changes_nothing(form, base):
     """Index 1 and no absorption: the base alone, whatever the coat's width."""
@@ -220,7 +236,9 @@ def test_a_coat_that_is_not_there_leaves_a_conductor_bit_close_but_for_its_secon
     prepared = coated.prepare()
     assert float(prepared.interfaces[0].drift) == 0.0
     assert float(prepared.interfaces[0].lengthening) == 0.0
-    np.testing.assert_allclose(brdf_rows(dataclasses.replace(coated, form=Corrected(rough_interface=False)), wi, wo), bare, rtol=1e-12)
+    np.testing.assert_allclose(
+        brdf_rows(dataclasses.replace(coated, form=Corrected(rough_interface=False)), wi, wo), bare, rtol=1e-12
+    )
 
 
 def furnace(stack, wi, count=8192):
@@ -249,7 +267,10 @@ def test_no_material_sends_back_more_than_it_gets(name, theta):
 
 def test_a_thicker_coat_is_darker():
     wi, wo = hemisphere(ROWS, 6), hemisphere(ROWS, 7)
-    values = [brdf_rows(Stack((varnish(tau=t),), Conductor(alpha=0.2, **COPPER)).astype(np.float64), wi, wo) for t in (0.0, 0.1, 1.0, 10.0)]
+    values = [
+        brdf_rows(Stack((varnish(tau=t),), Conductor(alpha=0.2, **COPPER)).astype(np.float64), wi, wo)
+        for t in (0.0, 0.1, 1.0, 10.0)
+    ]
     for thin, thick in zip(values, values[1:], strict=False):
         assert np.all(np.asarray(thick) <= np.asarray(thin))
 
@@ -277,7 +298,8 @@ def test_equal_widths_are_isotropic():
         kind = {"distribution": distribution}
         one = Stack((varnish(**kind),), Conductor(alpha=0.2, **COPPER, **kind)).astype(np.float64)
         two = Stack(
-            (varnish(alpha=None, alpha_x=0.1, alpha_y=0.1, **kind),), Conductor(alpha=None, alpha_x=0.2, alpha_y=0.2, **COPPER, **kind)
+            (varnish(alpha=None, alpha_x=0.1, alpha_y=0.1, **kind),),
+            Conductor(alpha=None, alpha_x=0.2, alpha_y=0.2, **COPPER, **kind),
         ).astype(np.float64)
         np.testing.assert_allclose(brdf_rows(two, wi, wo), brdf_rows(one, wi, wo), rtol=1e-13)
 

@@ -4,9 +4,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import FLOOR, REL, cases, close
 from scipy import integrate
 
+from helpers import FLOOR, REL, cases, close
 from layerfit.optics.fresnel import (
     conductor_f0,
     dielectric_f0,
@@ -73,7 +73,9 @@ def test_smith_masking_has_its_digits(oracle, dtype):
 def test_transmittance_is_what_is_not_reflected():
     c = jnp.linspace(0.0, 1.0, 200)
     for eta in (0.6, 0.9999, 1.0, 1.0001, 1.33, 3.0):
-        both = jax.vmap(lambda c, eta=eta: fresnel_dielectric(c, jnp.asarray(eta)) + transmittance_dielectric(c, jnp.asarray(eta)))(c)
+        both = jax.vmap(
+            lambda c, eta=eta: fresnel_dielectric(c, jnp.asarray(eta)) + transmittance_dielectric(c, jnp.asarray(eta))
+        )(c)
         # At c = 0 and index 1 nothing is reflected by definition: a boundary that is not there.
         np.testing.assert_allclose(both, 1.0, atol=1e-13)
 

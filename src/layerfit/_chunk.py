@@ -8,7 +8,7 @@ operation clamped to the domain, which is what a shader needs; its derivative is
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, TypeVar, dataclass_transform
+from typing import Any, TypeVar, cast, dataclass_transform
 
 import jax
 import jax.numpy as jnp
@@ -26,7 +26,7 @@ def chunk(fn: F) -> F:
     if fn.__name__ in CHUNKS:
         raise ValueError(f"two chunks are called {fn.__name__}; shader functions need names of their own")
     CHUNKS[fn.__name__] = fn
-    return jax.jit(fn)  # type: ignore[return-value]
+    return cast(F, jax.jit(fn))
 
 
 def static(default: Any = dataclasses.MISSING, **metadata: Any) -> Any:
@@ -42,10 +42,10 @@ def member(comment: str) -> Any:
 @dataclass_transform(frozen_default=True, field_specifiers=(static, member, dataclasses.field))
 def struct(cls: type[T]) -> type[T]:
     """A frozen dataclass that JAX maps over: fields made by `static` are structure, all others are leaves."""
-    cls = dataclasses.dataclass(frozen=True, eq=False)(cls)
-    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+    made: Any = dataclasses.dataclass(frozen=True, eq=False)(cls)
+    fields = dataclasses.fields(made)
     meta = [f.name for f in fields if f.metadata.get("static")]
-    return jax.tree_util.register_dataclass(cls, [f.name for f in fields if f.name not in meta], meta)
+    return jax.tree_util.register_dataclass(made, [f.name for f in fields if f.name not in meta], meta)
 
 
 def _tiny(x: jax.Array) -> float:

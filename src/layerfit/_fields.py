@@ -40,12 +40,12 @@ class Param:
 
 
 def param(
+    *,
     default: float | None,
     lower: float,
     upper: float,
     scale: Scale,
     doc: str,
-    *,
     unit: str = "1",
     colour: bool = False,
     fitted: bool = True,
@@ -56,9 +56,9 @@ def param(
     return dataclasses.field(default=default, metadata={"param": spec})
 
 
-def choice(default: str, *others: str, doc: str) -> Any:
+def choice(*, default: str, others: tuple[str, ...], doc: str) -> Any:
     """Declare a field of a layer that selects one of several forms."""
-    return static(default, choices=(default, *others), doc=doc)
+    return static(default=default, choices=(default, *others), doc=doc)
 
 
 def params(layer: Any) -> Iterator[tuple[str, Param]]:
@@ -77,5 +77,5 @@ def layer(cls: type[T]) -> type[T]:
             if isinstance(getattr(self, name), (list, tuple)):
                 object.__setattr__(self, name, np.asarray(getattr(self, name), float))
 
-    cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
+    type.__setattr__(cls, "__post_init__", __post_init__)
     return struct(cls)

@@ -4,9 +4,14 @@ Shading functions take scalars and 3-vectors; a batch is always added from outsi
 (the same in every channel) or one value a channel: formulas treat the two alike and never mix channels.
 """
 
+from typing import Any
+
 from jaxtyping import Array, Bool, Float
 
 Scalar = Float[Array, ""]
 Flag = Bool[Array, ""]
 Vec3 = Float[Array, "3"]
 Colour = Float[Array, ""] | Float[Array, "3"]
+
+Number = Any
+"""A field of a layer: a float, or three, where a user builds the layer; a traced array where it is evaluated; None where absent."""

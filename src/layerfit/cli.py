@@ -63,7 +63,9 @@ def _emit(document: Any) -> None:
 def fit(
     scene: Scene,
     output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
-    starts: Annotated[int | None, typer.Option(min=1, help="Starts that are tried; more find a global minimum more surely.")] = None,
+    starts: Annotated[
+        int | None, typer.Option(min=1, help="Starts that are tried; more find a global minimum more surely.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")] = None,
     loss: Annotated[str | None, typer.Option(help="square, huber or cauchy.")] = None,
     as_json: Json = False,
@@ -93,7 +95,9 @@ def _show_fit(outcome: Any, as_json: bool) -> None:
 
     for line in lines(outcome.document):
         stderr.print(line, markup=False, soft_wrap=True)
-    stderr.print(f"Results are in {outcome.directory}/: fit.png, report.html, material.frag, preset.json, fit.json", markup=False)
+    stderr.print(
+        f"Results are in {outcome.directory}/: fit.png, report.html, material.frag, preset.json, fit.json", markup=False
+    )
     if as_json:
         _emit(outcome.document)
 
@@ -105,7 +109,12 @@ class _progress:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         self.bar = Progress(
-            TextColumn("{task.description:>8}"), BarColumn(), TimeElapsedColumn(), console=stderr, transient=True, disable=not stderr.is_terminal
+            TextColumn("{task.description:>8}"),
+            BarColumn(),
+            TimeElapsedColumn(),
+            console=stderr,
+            transient=True,
+            disable=not stderr.is_terminal,
         )
         self.bar.start()
         self.task = self.bar.add_task("reading", total=1.0)
@@ -164,7 +173,9 @@ def evaluate(
 def export(
     preset: Preset,
     target: Annotated[str, typer.Option(help="glsl330 or essl300.")] = "glsl330",
-    uniforms: Annotated[bool, typer.Option("--uniforms", help="Parameters as uniforms, for live tuning, not as constants.")] = False,
+    uniforms: Annotated[
+        bool, typer.Option("--uniforms", help="Parameters as uniforms, for live tuning, not as constants.")
+    ] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Shader to write; left out, standard output.")] = None,
 ) -> None:
     """Print the shader of a preset.

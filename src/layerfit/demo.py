@@ -19,15 +19,17 @@ def run(directory: Path, console: Any) -> bool:
         for line in _summary(outcome.document):
             console.print(f"      {line}", markup=False, soft_wrap=True)
     console.print("\nPictures and reports:", markup=False)
-    for name, outcome in outcomes:
-        console.print(f"  {outcome.directory / 'fit.png'}  (report.html, material.frag, preset.json beside it)", markup=False, soft_wrap=True)
+    for _, outcome in outcomes:
+        console.print(
+            f"  {outcome.directory / 'fit.png'}  (report.html, material.frag, preset.json beside it)",
+            markup=False,
+            soft_wrap=True,
+        )
     return all(outcome.good for _, outcome in outcomes)
 
 
 def _summary(document: dict[str, Any]) -> list[str]:
-    rows = [
-        f"{name} = {number(row['value'])} +/- {number(row['sigma'])}" for name, row in document["parameters"].items()
-    ]
+    rows = [f"{name} = {number(row['value'])} +/- {number(row['sigma'])}" for name, row in document["parameters"].items()]
     error, parity = document["error"], document["parity"]
     return [
         ", ".join(rows),

@@ -12,9 +12,9 @@ from typing import Any
 import jax
 import numpy as np
 
+from .capture.exr import write_exr
 from .capture.samples import QUADRATURE, Samples, View, load
 from .capture.scene import read_scene
-from .capture.exr import write_exr
 from .documents import ensure_directory, write_bytes, write_text
 from .errors import InputError
 from .fit.fit import FitResult, fit
@@ -45,7 +45,9 @@ class Outcome:
     """Converged, shader verified."""
 
 
-def fit_scene(path: Path, directory: Path, *, import_s: float = 0.0, progress: Progress = lambda stage, share: None, **options: Any) -> Outcome:
+def fit_scene(
+    path: Path, directory: Path, *, import_s: float = 0.0, progress: Progress = lambda stage, share: None, **options: Any
+) -> Outcome:
     """Fit a scene and write everything to `directory`; each file whole or not at all, `fit.json` last.
 
     `options` override the scene's [fit] table. Raises `LayerfitError` for input or a machine that is at fault.

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from ._fields import Param, params
+from .documents import check_keys, nearest, read_document, write_text
 from .errors import InputError
 from .forms.corrected import Corrected
 from .forms.faithful import Faithful
 from .layers import LAYERS
 from .stack import Stack
 from .surfaces import BASES
-from .documents import check_keys, nearest, read_document, write_text
 
 SCHEMA = "layerfit/preset"
 VERSION = 1
@@ -110,7 +110,7 @@ def _layer(document: Any, kinds: Mapping[str, type], where: str) -> Any:
     if not isinstance(document, Mapping):
         raise InputError(f"{where}: should be a table of keys, not {document!r}")
     kind = document.get("type")
-    if kind not in kinds:
+    if not isinstance(kind, str) or kind not in kinds:
         raise InputError(f"{where}: type = {kind!r} is not one of {', '.join(kinds)}{nearest(str(kind), kinds)}")
     cls = kinds[kind]
     known = {field.name: field for field in dataclasses.fields(cls)}
@@ -131,7 +131,9 @@ def _layer(document: Any, kinds: Mapping[str, type], where: str) -> Any:
             raise InputError(f"{where}: give either alpha, or alpha_x and alpha_y")
         values["alpha"] = None
     if ("absorption_per_mm" in values) != ("thickness_um" in values):
-        raise InputError(f"{where}: absorption_per_mm and thickness_um come together; where neither is known give their product tau")
+        raise InputError(
+            f"{where}: absorption_per_mm and thickness_um come together; where neither is known give their product tau"
+        )
     if "tau" in values and "absorption_per_mm" in values:
         raise InputError(f"{where}: give either tau, or absorption_per_mm and thickness_um; tau is their product")
     return cls(**values)
@@ -181,4 +183,3 @@ def rounded(value: Any) -> Any:
     """A number or a colour for a document: as many digits as float32 holds."""
     array = np.asarray(value, np.float32)
     return float(str(array)) if array.shape == () else [float(str(v)) for v in array]
-

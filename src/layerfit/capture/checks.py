@@ -71,15 +71,12 @@ def _header_eye(exr: Exr) -> np.ndarray | None:
 
 
 def _windows(exr: Exr) -> Iterator[Finding]:
-    display = exr.display_window
-    for window in dict.fromkeys(part.data_window for part in exr.parts if part.data_window != display):
+    x0, y0, x1, y1 = exr.display_window
+    for window in dict.fromkeys(part.data_window for part in exr.parts if part.data_window != exr.display_window):
         parts = ", ".join(part.name for part in exr.parts if part.name and part.data_window == window)
-        detail = f"pixels from {window[:2]} to {window[2:]}, picture from {display[:2]} to {display[2:]}" + (
-            parts and f" ({parts})"
-        )
-        inside = max(window[0], display[0]) <= min(window[2], display[2]) and max(window[1], display[1]) <= min(
-            window[3], display[3]
-        )
+        where = f"pixels of {parts}" if parts else "pixels"
+        detail = f"{where} from {window[:2]} to {window[2:]}, the picture from {(x0, y0)} to {(x1, y1)}"
+        inside = window[0] <= x1 and window[2] >= x0 and window[1] <= y1 and window[3] >= y0
         if inside:
             advice = "None needed: pixels outside the picture (overscan) are cropped, and where there are none it is black."
             yield Finding("data window differs from display window", "note", detail, advice)
@@ -199,9 +196,9 @@ def _normal_space(normals: np.ndarray, position: np.ndarray, there: np.ndarray, 
     n = normals[inner] / np.maximum(length, 1e-30)
     # the gradients give the surface's side only up to one sign, which is that of the handedness of space and picture
     apart = min(_angle(n, surface), _angle(n, -surface))
-    turned = min(_angle(n @ _frame(n, side), side) for side in (surface, -surface))
+    turned = _angle(n @ _frame(n, surface), surface)
     if apart > _TURNED and turned < apart / 3:
-        detail = f"they are {apart:.1f} degrees from the surface of the positions, and {turned:.1f} once turned or mirrored as a whole"
+        detail = f"{apart:.1f} degrees from the surface of the positions, {turned:.1f} once turned or mirrored as a whole"
         advice = "Render normals in world space: these are in camera space, or have other axes than the positions."
         yield Finding("normals are not in the space of the positions", "warning", detail, advice)
     elif apart > _UNLIKE:

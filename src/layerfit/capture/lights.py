@@ -7,6 +7,7 @@ three widths and (spheres, maps) the light itself, weighted by the balance heuri
 
 import dataclasses
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from ..errors import InputError
 from .exr import read_exr
 from .geometry import frames, normalise
 from .scene import Constant, Directional, EnvironmentMap, Light, Point, SphereLight
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeIs
 
 HALF_VECTOR_WIDTHS = (0.06, 0.18, 0.5)
 """GGX widths of the half vectors: between them they follow lobes from a polished coat to a rough base."""
@@ -27,7 +31,7 @@ class Received:
     weight: np.ndarray
 
 
-def is_exact(light: Light) -> bool:
+def is_exact(light: Light) -> "TypeIs[Directional | Point]":
     """Whether one sample is all there is to it."""
     return isinstance(light, (Directional, Point))
 

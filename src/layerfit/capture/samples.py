@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..stack import Stack
 from .channels import Channels, resolve
 from .exr import read_exr
 from .geometry import Surface, frames, normalise, sphere_surface, sphere_tangent
 from .lights import is_exact, receive
-from ..stack import Stack
 from .scene import Reference, Scene
 
 QUADRATURE = 992
@@ -128,7 +128,9 @@ def load_reference(reference: Reference, min_cosine: float) -> View:
         # A pixel that a grazing light reaches and no other holds little but the model's weakest angle.
         dropped[f"lit at a grazing angle or not at all (cosine below {min_cosine:g})"] = int(np.sum(~lit))
         if flat.size and not lit.any():
-            raise InputError(f"{reference.exr}: no light reaches the visible side of the object; check the positions in [[light]]")
+            raise InputError(
+                f"{reference.exr}: no light reaches the visible side of the object; check the positions in [[light]]"
+            )
         kept.reshape(-1)[flat[~lit]] = False
     index = np.flatnonzero(kept)
     if index.size < 32:
@@ -136,7 +138,9 @@ def load_reference(reference: Reference, min_cosine: float) -> View:
         raise InputError(f"{reference.exr}: only {index.size} of {height * width} pixels can be compared ({lost})")
     target = beauty.reshape(-1, 3)[index].astype(float)
     if not np.any(target > 0.0):
-        raise InputError(f"{reference.exr}: the object is black in every usable pixel; check the beauty channels and the lights")
+        raise InputError(
+            f"{reference.exr}: the object is black in every usable pixel; check the beauty channels and the lights"
+        )
     pick = lambda image: image.reshape(-1, 3)[index]  # noqa: E731
     return View(
         reference=reference,
@@ -188,5 +192,7 @@ def _mask(path: Path | None, shape: tuple[int, int]) -> np.ndarray:
     channels: dict[str, Any] = dict(read_exr(path).channels)
     first = next(iter(channels.values()))
     if first.shape != shape:
-        raise InputError(f"{path}: the mask is {first.shape[1]} x {first.shape[0]}, the reference {shape[1]} x {shape[0]} pixels")
+        raise InputError(
+            f"{path}: the mask is {first.shape[1]} x {first.shape[0]}, the reference {shape[1]} x {shape[0]} pixels"
+        )
     return first > 0.5

@@ -5,8 +5,8 @@ a fit starts on one block and ends on all of them, by a count, without compiling
 """
 
 import dataclasses
+from typing import Any
 
-import jax
 import numpy as np
 
 from .._chunk import struct
@@ -20,12 +20,12 @@ LARGEST = 4096
 class Blocks:
     """Arrays of (blocks, pixels, ...): directions, weights, targets, residual weights, and thickness scales a block."""
 
-    wi: jax.Array
-    wo: jax.Array
-    weight: jax.Array
-    target: jax.Array
-    inverse_sigma: jax.Array
-    scale: jax.Array | None
+    wi: Any
+    wo: Any
+    weight: Any
+    target: Any
+    inverse_sigma: Any
+    scale: Any
     """(blocks, layers): thickness over that of the material; absent where it is 1 everywhere."""
 
     @property

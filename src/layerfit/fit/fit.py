@@ -194,9 +194,7 @@ class _Fit:
         bounds = tuple(map(jax.numpy.asarray, self.bounds))
         return step(self.clock, u, state, bounds, self.start, blocks, np.int32(count), free=self.free, solver=self.solver)
 
-    def _descend(
-        self, u: np.ndarray, count: int, most: int, stage: str, start: int
-    ) -> tuple[np.ndarray, float, bool, np.ndarray]:
+    def _descend(self, u: Any, count: int, most: int, stage: str, start: int) -> tuple[np.ndarray, float, bool, np.ndarray]:
         """Run the solver from `u` on the first `count` blocks; returns the point, its cost, whether it converged, and J^T J."""
         u = jax.numpy.asarray(u, float)
         state = initial(u, self.solver)
@@ -207,7 +205,12 @@ class _Fit:
             self.trace.append(Row(time.perf_counter() - self.began, stage, start, k, error))
             if bool(state.done):
                 break
-        return np.asarray(u), float(state.loss), bool(state.done) and bool(np.isfinite(float(state.loss))), np.asarray(state.gram)
+        return (
+            np.asarray(u),
+            float(state.loss),
+            bool(state.done) and bool(np.isfinite(float(state.loss))),
+            np.asarray(state.gram),
+        )
 
     def _drop_blind(self, origin: np.ndarray) -> None:
         """Hold what has no effect on these images, with a reason; a parameter that the user asked for by name is an error."""
@@ -297,7 +300,9 @@ def _scales(views: Sequence[View], start: Stack) -> np.ndarray | None:
     for view in views:
         for name in view.reference.thickness_scale:
             if name not in names:
-                raise InputError(f"{view.reference.exr}: thickness_scale names {name!r}; the coats are {', '.join(names) or 'none'}")
+                raise InputError(
+                    f"{view.reference.exr}: thickness_scale names {name!r}; the coats are {', '.join(names) or 'none'}"
+                )
     scales = [view.scales(start) for view in views]
     if all(scale is None for scale in scales):
         return None

@@ -136,7 +136,9 @@ def parametrise(stack: Stack, free: Sequence[str] | None, fixed: Sequence[str], 
     names = free_by_default(stack) if free is None else tuple(free)
     for name in names:
         if name not in known:
-            raise InputError(f"{where}.free: unknown parameter {name!r}{nearest(name, known)}. This material has {', '.join(known)}")
+            raise InputError(
+                f"{where}.free: unknown parameter {name!r}{nearest(name, known)}. This material has {', '.join(known)}"
+            )
     if free is not None and (both := set(free) & set(fixed)):
         raise InputError(f"{where}: {', '.join(sorted(both))} cannot be both free and fixed")
     names = tuple(name for name in known if name in names and name not in fixed)
@@ -153,4 +155,3 @@ def parametrise(stack: Stack, free: Sequence[str] | None, fixed: Sequence[str], 
         chosen.append(Free(name, k, field, spec, tuple(range(slot, slot + width))))
         slot += width
     return dataclasses.replace(stack, layers=tuple(layers[:-1]), base=layers[-1]), Parametrisation(tuple(chosen))
-

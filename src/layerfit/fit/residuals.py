@@ -14,7 +14,7 @@ from ..render import radiance
 from ..stack import Stack
 from .blocks import Blocks
 from .parameters import Parametrisation
-from .solve import NormalLevenbergMarquardt, normal_equations
+from .solve import normal_equations
 
 
 def scaled(stack: Stack, scale: Any) -> Stack:
@@ -87,7 +87,9 @@ class Compiled:
         return jax.block_until_ready(self._executables[key](*args))
 
 
-def _step(u: Any, state: Any, bounds: Any, start: Stack, blocks: Blocks, count: Any, *, free: Parametrisation, solver: Any) -> Any:
+def _step(
+    u: Any, state: Any, bounds: Any, start: Stack, blocks: Blocks, count: Any, *, free: Parametrisation, solver: Any
+) -> Any:
     """One step of the solver from `u`: the new point and the new state."""
     fn = lambda y, args: _normal(y, start, free, blocks, count)  # noqa: E731
     options = {"lower": bounds[0], "upper": bounds[1]}
@@ -98,7 +100,7 @@ def _step(u: Any, state: Any, bounds: Any, start: Stack, blocks: Blocks, count: 
 step = Compiled(_step, ("free", "solver"))
 
 
-def initial(u: Any, solver: NormalLevenbergMarquardt) -> Any:
+def initial(u: Any, solver: Any) -> Any:
     """State of the solver before its first step at `u`."""
     return solver.init(None, u, None, {}, None, None, frozenset())
 

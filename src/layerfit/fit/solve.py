@@ -25,7 +25,8 @@ def normal_equations(residual: Callable[[list[Any]], Any], fields: list[Any], sl
     `residual` maps fields, each a scalar or one value a channel, to (pixels, channels); its channel c must depend on channel c of
     a colour only. `slots` are the places of each field's entries in the vector of parameters.
     """
-    columns = []
+    columns: list[Any] = []
+    r: Any = 0.0
     for k, value in enumerate(fields):
         moved = lambda x, k=k: residual([*fields[:k], x, *fields[k + 1 :]])  # noqa: E731
         r, column = jax.jvp(moved, (value,), (jnp.ones_like(value),))
@@ -81,7 +82,7 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     descent: optx.AbstractDescent = optx.DampedNewtonDescent(linear_solver=lx.Cholesky())
     search: optx.AbstractSearch = optx.ClassicalTrustRegion()
 
-    def init(self, fn, y, args, options, f_struct, aux_struct, tags):  # noqa: D102
+    def init(self, fn, y, args, options, f_struct, aux_struct, tags):
         n = y.size
         empty = self._info(jnp.zeros(()), jnp.zeros(n), jnp.eye(n))
         zero = jnp.zeros(())
@@ -97,7 +98,7 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
             result=optx.RESULTS.successful,
         )
 
-    def step(self, fn, y, args, options, state, tags):  # noqa: D102
+    def step(self, fn, y, args, options, state, tags):
         lower, upper = options["lower"], options["upper"]
         loss, (gradient, gram) = fn(state.y_eval, args)
         # A trial that is not finite is a trial that failed: the trust region shrinks.
@@ -111,8 +112,7 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
         done = accept & ~state.first & small & (gained <= self.rtol * state.loss)
         y = jnp.where(accept, state.y_eval, y)
         loss, gradient, gram = (
-            jnp.where(accept, new, old)
-            for new, old in ((loss, state.loss), (gradient, state.gradient), (gram, state.gram))
+            jnp.where(accept, new, old) for new, old in ((loss, state.loss), (gradient, state.gradient), (gram, state.gram))
         )
         # Nothing left to gain: float32 residuals cannot show a smaller step, or the start was not finite.
         stuck = (step_size < 1e-9) | (state.first & ~jnp.isfinite(loss))
@@ -139,8 +139,8 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
         step, _ = self.descent.step(step_size, state)
         return jnp.nan_to_num(step) * scale
 
-    def terminate(self, fn, y, args, options, state, tags):  # noqa: D102
+    def terminate(self, fn, y, args, options, state, tags):
         return state.done, state.result
 
-    def postprocess(self, fn, y, aux, args, options, state, tags, result):  # noqa: D102
+    def postprocess(self, fn, y, aux, args, options, state, tags, result):
         return y, aux, {}

@@ -227,7 +227,7 @@ def _enter(above: _Below | None, wi: Vec3, wo: Vec3, prepared: Prepared, options
     )
 
 
-def _absorbed(tau: Colour | None, path: Scalar) -> Colour | float:
+def _absorbed(tau: Colour | None, path: Scalar) -> Any:
     return 1.0 if tau is None else transmittance(tau, path)
 
 
@@ -248,7 +248,7 @@ def _bounced(target: Microfacets, below: _Below, options: Corrected) -> Colour:
     F = target.fresnel(half_cosine(wi, wo))
     q = F * _returned(target, below, options) * below.directional
     spread = _spread(target, below) if options.broaden else None
-    lobes: Colour = 0.0
+    lobes: Any = 0.0
     for order in range(max(options.orders, 1), 0, -1):
         width = target.width if spread is None else _widened(target, order, below, spread)
         D = target.density(h, width)
@@ -291,7 +291,7 @@ def _spread(target: Microfacets, below: _Below) -> Width:
     p = WIDTH_POWER[target.distribution]
 
     def along(axis: int) -> Scalar:
-        spread: Scalar | float = 0.0
+        spread: Any = 0.0
         for width, spread_i, spread_o in below.spreads:
             spread = spread + (_power(spread_i, p) + _power(spread_o, p)) * _power(_component(width, axis), p)
         return spread
@@ -365,14 +365,14 @@ def _escape(coats: list[Coat], interfaces: list[Interface]) -> Colour:
     return jax.lax.scan(add, zero, (jnp.asarray(u), jnp.asarray(weight)))[0]
 
 
-def _lost(tau: Colour | None, cosine: Scalar) -> Colour | float:
+def _lost(tau: Colour | None, cosine: Scalar) -> Any:
     """Absorbed on the way up and down again."""
     return 0.0 if tau is None else -jnp.expm1(-tau * safe_divide(2.0, cosine))
 
 
 def _passed_up(coats: list[Coat], interfaces: list[Interface], p2: Scalar) -> Colour:
     """Part of the light from below that leaves the stack; p2 = (n sin)^2, the same in every medium."""
-    S: Colour = 1.0
+    S: Any = 1.0
     n_above = jnp.ones_like(interfaces[0].n)
     for depth, (coat, interface) in enumerate(zip(coats, interfaces, strict=True)):
         cosine2 = 1.0 - p2 / (n_above * n_above)

@@ -40,7 +40,7 @@ class Prepared:
 
 def prepare(coats: tuple[Coat, ...], base: Any, options: Faithful) -> Prepared:
     """Relative indices, outermost coat first."""
-    n = 1.0
+    n: Any = 1.0
     relative = []
     for coat in coats:
         relative.append(coat.below(n))

@@ -5,8 +5,9 @@ from typing import Self
 
 from .._chunk import static
 from .._fields import choice, layer, param
-from .._types import Colour, Scalar
+from .._types import Colour, Number, Scalar
 from ..optics.fresnel import fresnel_dielectric, transmittance_dielectric
+from ..optics.microfacet import Distribution, Masking
 from ..surfaces.microfacet import Microfacets, alpha_param
 
 
@@ -18,20 +19,26 @@ class Coat(Microfacets):
     Only their product tau = absorption * thickness is seen in one image.
     """
 
-    name: str = static("coat", doc="name of the layer")
-    alpha: Scalar | None = alpha_param(0.1, "")
-    alpha_x: Scalar | None = alpha_param(None, " along the tangent")
-    alpha_y: Scalar | None = alpha_param(None, " across the tangent")
-    eta: Scalar = param(1.5, 1.0, 3.0, "linear", "index of refraction, against air")
-    tau: Colour | None = param(
-        None, 0.0, 50.0, "softlog", "optical depth, one way at normal incidence", colour=True, soft=0.05
+    name: str = static(default="coat", doc="name of the layer")
+    alpha: Number = alpha_param(default=0.1, which="")
+    alpha_x: Number = alpha_param(default=None, which=" along the tangent")
+    alpha_y: Number = alpha_param(default=None, which=" across the tangent")
+    eta: Number = param(default=1.5, lower=1.0, upper=3.0, scale="linear", doc="index of refraction, against air")
+    tau: Number = param(
+        default=None,
+        lower=0.0,
+        upper=50.0,
+        scale="softlog",
+        doc="optical depth, one way at normal incidence",
+        colour=True,
+        soft=0.05,
     )
-    absorption_per_mm: Colour | None = param(
-        None, 0.0, 1e4, "softlog", "absorption coefficient", unit="1/mm", colour=True, soft=1.0
+    absorption_per_mm: Number = param(
+        default=None, lower=0.0, upper=1e4, scale="softlog", doc="absorption coefficient", unit="1/mm", colour=True, soft=1.0
     )
-    thickness_um: Scalar | None = param(None, 0.1, 5e3, "log", "thickness", unit="um", fitted=False)
-    distribution: str = choice("ggx", "beckmann", doc="density of the facet normals")
-    masking: str = choice("smith", "smith_separable", "vcavity", doc="how facets hide one another")
+    thickness_um: Number = param(default=None, lower=0.1, upper=5e3, scale="log", doc="thickness", unit="um", fitted=False)
+    distribution: Distribution = choice(default="ggx", others=("beckmann",), doc="density of the facet normals")
+    masking: Masking = choice(default="smith", others=("smith_separable", "vcavity"), doc="how facets hide one another")
 
     @property
     def optical_depth(self) -> Colour | None:

@@ -11,7 +11,9 @@ from ..fit.metrics import display
 Panel = tuple[str, np.ndarray]
 """A caption and an sRGB image (H, W, 3) in [0, 1]."""
 
-_RAMP = np.array([[0, 0, 4], [51, 13, 96], [120, 28, 109], [187, 55, 84], [237, 105, 37], [252, 180, 25], [252, 255, 164]]) / 255.0
+_RAMP = (
+    np.array([[0, 0, 4], [51, 13, 96], [120, 28, 109], [187, 55, 84], [237, 105, 37], [252, 180, 25], [252, 255, 164]]) / 255.0
+)
 """Dark to bright through violet and orange: even in lightness, and readable without colour vision."""
 
 _BACKGROUND, _INK = (24, 24, 27), (228, 228, 231)
@@ -33,7 +35,9 @@ def difference(image: np.ndarray, reference: np.ndarray, white: float, covered: 
     return np.where(covered[..., None], false_colour(error / top), 0.05), top
 
 
-def compare(panels: Sequence[Panel], image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray) -> list[Panel]:
+def compare(
+    panels: Sequence[Panel], image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray
+) -> list[Panel]:
     """The panels with a difference of two linear images after them."""
     picture, top = difference(image, reference, white, covered)
     return [*panels, (f"difference, 0 to {100.0 * top:.2g} % of white", picture)]
@@ -50,9 +54,7 @@ def strip(rows: Sequence[Sequence[Panel]]) -> bytes:
     scale = max(1, round(256 / max(height, width)))
     height, width = height * scale, width * scale
     columns = max(len(row) for row in rows)
-    canvas = Image.new(
-        "RGB", (columns * (width + _GAP) + _GAP, len(rows) * (height + _GAP + _CAPTION) + _GAP), _BACKGROUND
-    )
+    canvas = Image.new("RGB", (columns * (width + _GAP) + _GAP, len(rows) * (height + _GAP + _CAPTION) + _GAP), _BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     font = ImageFont.load_default(13)
     for r, row in enumerate(rows):

@@ -31,7 +31,9 @@ def lines(document: Mapping[str, Any]) -> list[str]:
             notes.append(f"= {row['derived']}")
         start = f"  (start {number(row['start'])})" if "start" in row else ""
         unit = f" {row['unit']}" if row.get("unit", "1") != "1" else ""
-        out.append(f"    {name + ':':<26} {number(row['value'])} +/- {number(row['sigma'])}{unit}{start}{'  ' * bool(notes)}{', '.join(notes)}")
+        out.append(
+            f"    {name + ':':<26} {number(row['value'])} +/- {number(row['sigma'])}{unit}{start}{'  ' * bool(notes)}{', '.join(notes)}"
+        )
     if d["correlations"]:
         out += ["[[Correlations]] (below 0.5 are not listed)"]
         out += [f"    C({a}, {b}) = {r:+.3f}" for a, b, r in d["correlations"][:12]]

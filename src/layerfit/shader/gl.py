@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -31,7 +32,8 @@ def context() -> moderngl.Context:
     Raises `MachineError` with what to install where there is neither.
     """
     reasons = []
-    for settings in ({"backend": "egl"}, {}):
+    attempts: tuple[dict[str, Any], ...] = ({"backend": "egl"}, {})
+    for settings in attempts:
         try:
             ctx = moderngl.create_context(standalone=True, require=330, **settings)
         except Exception as error:  # moderngl raises bare Exception, and glcontext ImportError, for every missing piece
@@ -84,8 +86,8 @@ def shade_points(
     height = (n + 1 + width - 1) // width  # at least one pixel more than rows: the sentinel
     program = compile_points(fragment, {name: a.shape[-1] for name, a in attributes.items()})
     for name, value in (uniforms or {}).items():
-        if name in program:
-            program[name].value = value
+        if isinstance(member := program.get(name, None), moderngl.Uniform):
+            member.value = value
     row, column = np.divmod(np.arange(n), width)
     pixel = np.stack([(column + 0.5) / width * 2.0 - 1.0, (row + 0.5) / height * 2.0 - 1.0], -1).astype("f4")
     used = {name: a for name, a in attributes.items() if f"a_{name}" in program}
@@ -132,6 +134,8 @@ def _target(size: tuple[int, int]) -> moderngl.Framebuffer:
 def _check_drawn(alpha: np.ndarray, n: int) -> None:
     missing = np.flatnonzero(alpha[:n] == MARKER)
     if missing.size:
-        raise MachineError(f"the GL driver ({renderer()}) left {missing.size} of {n} pixels undrawn, the first is number {missing[0]}")
+        raise MachineError(
+            f"the GL driver ({renderer()}) left {missing.size} of {n} pixels undrawn, the first is number {missing[0]}"
+        )
     if not np.all(alpha[n:] == MARKER):
         raise MachineError(f"the GL driver ({renderer()}) drew to pixels outside the image: its float target cannot be trusted")

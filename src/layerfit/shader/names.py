@@ -12,16 +12,16 @@ try:
 except ImportError:  # an internal that may move; every name then comes from the printer's fall-back
     user_frames = None
 
-Span = tuple[int, int, int, int]
+Span = tuple[int, int, int | None, int | None]
 
 GUARDS = "_chunk.py"
 """Guards print as the plain operation: their own local names say nothing about the formula."""
 
 
 def source_of(eqn) -> str:
-    """file:line of the user's code that made an equation, for error messages."""
+    """file:line of the user's code that made an equation, for error messages; empty where it is not known."""
     frame = next(_frames(eqn), None)
-    return f"{frame.file_name}:{frame.start_line}" if frame else "an unknown line"
+    return f"{frame.file_name}:{frame.start_line}" if frame else ""
 
 
 def name_of(eqn) -> str | None:

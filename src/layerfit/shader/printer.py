@@ -14,81 +14,9 @@ import jax
 import numpy as np
 from jax.extend.core import Literal
 
-from .helpers import HELPERS
+from .glsl import ATOM, PREFIX, UNARY, PrintError, StructType, Value, glsl_type, indent, lift, literal, safe
 from .names import name_of, source_of
-
-PREFIX = "lf_"
-ATOM, UNARY, PRODUCT, SUM, COMPARISON, LOGIC, CHOICE = range(7)
-"""How tightly an expression binds, tightest first."""
-
-_SCALAR_TYPES = {"f": "float", "b": "bool", "i": "int", "u": "uint"}
-_VECTOR_TYPES = {"float": "vec", "bool": "bvec", "int": "ivec", "uint": "uvec"}
-_RESERVED = set(
-    "active asm attribute break buffer case cast centroid class coherent common const continue default discard do double else "
-    "enum extern external filter fixed flat float for goto half highp if image in inline inout input int interface invariant "
-    "layout lowp main mediump namespace noinline noperspective out output packed partition patch precise precision public "
-    "readonly resource restrict return sample sampler shared sizeof smooth static struct subroutine superp switch template "
-    "texture this true false typedef uint uniform union unsigned using varying vec void volatile while writeonly".split()
-)
-
-
-class PrintError(Exception):
-    """A traced function holds something that has no GLSL form."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Value:
-    """A piece of GLSL: its text, its type, how tightly it binds, and the locals that it reads."""
-
-    text: str
-    type: str
-    binds: int = ATOM
-    reads: frozenset[str] = frozenset()
-
-
-@dataclasses.dataclass(frozen=True)
-class StructType:
-    """A GLSL struct: its name and its fields as (name, type, comment)."""
-
-    name: str
-    fields: tuple[tuple[str, str, str], ...]
-
-
-def _base_type(kind: str) -> str:
-    return re.sub(r"\d", "", {"vec": "float", "bvec": "bool", "ivec": "int", "uvec": "uint"}.get(kind[:-1], kind))
-
-
-def glsl_type(aval: Any) -> str:
-    """GLSL type of an abstract value."""
-    scalar = _SCALAR_TYPES[np.dtype(aval.dtype).kind]
-    if aval.shape == ():
-        return scalar
-    if aval.shape in ((2,), (3,), (4,)):
-        return f"{_VECTOR_TYPES[scalar]}{aval.shape[0]}"
-    raise PrintError(f"a value of shape {aval.shape} has no GLSL type: shading code is made of scalars and 3-vectors")
-
-
-def literal(value: Any) -> str:
-    """A constant, in the fewest digits that read back as the same float32."""
-    value = np.asarray(value)
-    if value.ndim:
-        parts = [literal(v) for v in value]
-        kind = glsl_type(value)
-        return f"{kind}({parts[0] if len(set(parts)) == 1 else ', '.join(parts)})"
-    if value.dtype.kind == "b":
-        return "true" if value else "false"
-    if value.dtype.kind == "u":
-        return f"{int(value)}u"
-    if value.dtype.kind == "i":
-        return str(int(value))
-    text = str(np.float32(value))
-    if not np.isfinite(np.float32(value)):
-        raise PrintError(f"{text} has no GLSL literal")
-    return text if "." in text or "e" in text else text + ".0"
-
-
-def indent(text: str) -> str:
-    return "".join(f"    {line}\n" if line else "\n" for line in text.splitlines())
+from .primitives import PRIMITIVES
 
 
 class Printer:
@@ -119,11 +47,11 @@ class Printer:
 
     def struct(self, example: Any, leaves: Sequence[tuple[str, str]]) -> StructType:
         """The GLSL struct of a Python one (an instance or its class), given its leaves as (name, type)."""
-        cls = example if inspect.isclass(example) else type(example)
+        cls: Any = example if inspect.isclass(example) else type(example)
         key = (cls.__name__, tuple(leaves))
         if key not in self.structs:
             taken = sum(name == cls.__name__ for name, _ in self.structs)
-            comments = {f.name: _comment(f) for f in dataclasses.fields(cls)}
+            comments = {safe(f.name): _comment(f) for f in dataclasses.fields(cls)}
             fields = tuple((name, kind, comments.get(name, "")) for name, kind in leaves)
             self.structs[key] = StructType(cls.__name__ + (str(taken + 1) if taken else ""), fields)
         return self.structs[key]
@@ -134,12 +62,18 @@ class Printer:
         if not dataclasses.is_dataclass(value):
             return f"const {glsl_type(leaves[0][1])} {name} = {literal(leaves[0][1])};\n"
         struct = self.struct(value, [(key, glsl_type(leaf)) for key, leaf in leaves])
-        rows = [(literal(leaf), f"{key}: {comment}") for (key, leaf), (_, _, comment) in zip(leaves, struct.fields, strict=True)]
+        rows = [
+            (literal(leaf), f"{key}: {comment}") for (key, leaf), (_, _, comment) in zip(leaves, struct.fields, strict=True)
+        ]
         width = max(len(text) for text, _ in rows) + 1
-        lines = [f"    {text + (',' if k < len(rows) - 1 else ''):<{width}}  // {note}\n" for k, (text, note) in enumerate(rows)]
+        lines = [
+            f"    {text + (',' if k < len(rows) - 1 else ''):<{width}}  // {note}\n" for k, (text, note) in enumerate(rows)
+        ]
         return f"const {struct.name} {name} = {struct.name}(\n{''.join(lines)});\n"
 
-    def function(self, fn: Callable[..., Any], name: str, given: Sequence[tuple[Any, str]], params: Sequence[tuple[Any, str]]) -> None:
+    def function(
+        self, fn: Callable[..., Any], name: str, given: Sequence[tuple[Any, str]], params: Sequence[tuple[Any, str]]
+    ) -> None:
         """Print `fn(*given, *params)` as the GLSL function `name`.
 
         `given` are pytrees that stand outside the function (constants, uniforms), each with the expression to reach it, its leaves by
@@ -147,7 +81,7 @@ class Printer:
         """
         trees = [tree for tree, _ in (*given, *params)]
         closed = jax.make_jaxpr(fn)(*trees)
-        body = _Body(self, closed.jaxpr, closed.consts)
+        body = Body(self, closed.jaxpr, closed.consts)
         names: list[str] = []
         for tree, text in given:
             for path, leaf in _leaves(tree):
@@ -164,7 +98,7 @@ class Printer:
         (result,) = body.run()
         kind = glsl_type(closed.out_avals[0])
         doc = _comment_lines(fn)
-        text = f"{doc}{kind} {name}({', '.join(declared)}) {{\n{indent(body.text(_lift(result, kind)))}}}\n"
+        text = f"{doc}{kind} {name}({', '.join(declared)}) {{\n{indent(body.text(lift(result, kind)))}}}\n"
         self.functions[name] = (name, text)
 
     def chunk(self, name: str, closed: Any) -> tuple[str, list[tuple[str, str, StructType | None]], StructType | None]:
@@ -181,18 +115,20 @@ class Printer:
         if len(jaxpr.outvars) > 1:
             ((_, leaves),) = _group(info.result_paths, [v.aval for v in jaxpr.outvars])
             if not dataclasses.is_dataclass(notes.get("return")):
-                raise PrintError(f"the chunk {name} returns several values: give them a struct, and the function its annotation")
+                raise PrintError(
+                    f"the chunk {name} returns several values: give them a struct, and the function its annotation"
+                )
             returned = self.struct(notes["return"], leaves)
-        body = _Body(self, jaxpr, closed.consts)
+        body = Body(self, jaxpr, closed.consts)
         for (root, kind, struct), (_, leaves) in zip(params, groups, strict=True):
-            root = _safe(root)
-            for (leaf, leaf_kind) in leaves:
+            root = safe(root)
+            for leaf, leaf_kind in leaves:
                 body.bind_next(Value(f"{root}.{leaf}" if struct else root, leaf_kind, reads=frozenset({root})))
             body.parameter(root, struct.name if struct else kind)
-        results = [_lift(r, glsl_type(v.aval)) for r, v in zip(body.run(), jaxpr.outvars, strict=True)]
+        results = [lift(r, glsl_type(v.aval)) for r, v in zip(body.run(), jaxpr.outvars, strict=True)]
         kind = returned.name if returned else glsl_type(jaxpr.outvars[0].aval)
         result = Value(f"{kind}({', '.join(r.text for r in results)})", kind) if returned else results[0]
-        signature = ", ".join(f"{struct.name if struct else kind} {_safe(root)}" for root, kind, struct in params)
+        signature = ", ".join(f"{struct.name if struct else kind} {safe(root)}" for root, kind, struct in params)
         printed = f"({signature}) {{\n{indent(body.text(result))}}}\n"
         same_types = (name, tuple(struct.name if struct else kind for _, kind, struct in params))
         for (key, _), (glsl_name, text) in ((k, v) for k, v in self.functions.items() if isinstance(k, tuple)):
@@ -222,7 +158,9 @@ class _Frame:
         self.live.reverse()
         for var, value in zip(jaxpr.constvars, consts, strict=True):
             row = var.aval.ndim == 1 and var.aval.size > 4
-            self.values[var] = Value(printer.array(np.asarray(value)), "row") if row else Value(literal(value), glsl_type(var.aval))
+            self.values[var] = (
+                Value(printer.array(np.asarray(value)), "row") if row else Value(literal(value), glsl_type(var.aval))
+            )
 
     def read(self, var: Any) -> Value:
         if isinstance(var, Literal):
@@ -235,7 +173,7 @@ class _Frame:
         return any(count > 0 and var in self.values and name in self.values[var].reads for var, count in self.left.items())
 
 
-class _Body:
+class Body:
     """The statements of one function."""
 
     def __init__(self, printer: Printer, jaxpr: Any, consts: Sequence[Any]):
@@ -244,6 +182,7 @@ class _Body:
         self.lines: list[str] = []
         self.taken: set[str] = set()
         self.declared: dict[str, str] = {}
+        self.enclosing: list[Any] = []
         self.frames = [_Frame(printer, jaxpr, consts)]
         self._params = iter(jaxpr.invars)
 
@@ -277,7 +216,7 @@ class _Body:
 
     def local(self, name: str, value: Value) -> Value:
         """Give a value a name; a name whose old value is no longer read is assigned again."""
-        base = name = _safe(name)
+        base = name = safe(name)
         k = 2
         while name in self.taken or (name in self.declared and not self._free(name, value.type)):
             name, k = f"{base}{k}", k + 1
@@ -289,13 +228,19 @@ class _Body:
     def _free(self, name: str, kind: str) -> bool:
         return self.declared[name] == kind and not any(frame.needs(name) for frame in self.frames)
 
-    def _inline(self, jaxpr: Any, consts: Sequence[Any], operands: Sequence[Value]) -> list[Value]:
-        frame = _Frame(self.printer, jaxpr, consts)
-        frame.values.update(zip(jaxpr.invars, operands, strict=True))
+    def _inline(self, eqn: Any, closed: Any, operands: Sequence[Value]) -> list[Value]:
+        frame = _Frame(self.printer, closed.jaxpr, closed.consts)
+        frame.values.update(zip(closed.jaxpr.invars, operands, strict=True))
         self.frames.append(frame)
-        results = self._walk(frame, jaxpr, named=False)
+        self.enclosing.append(eqn)
+        results = self._walk(frame, closed.jaxpr, named=False)
+        self.enclosing.pop()
         self.frames.pop()
         return results
+
+    def _where(self, eqn: Any) -> str:
+        """The user's line: inside a function of JAX that was traced before, only the call of it has one."""
+        return next((line for e in (eqn, *reversed(self.enclosing)) if (line := source_of(e))), "an unknown line")
 
     def _translate(self, eqn: Any, operands: list[Value], name: str | None) -> list[Value]:
         primitive = eqn.primitive.name
@@ -303,18 +248,18 @@ class _Body:
             closed, called = eqn.params["jaxpr"], eqn.params["name"]
             if called in self.printer.chunks:
                 return self._call(closed, called, operands, name)
-            return self._inline(closed.jaxpr, closed.consts, operands)
+            return self._inline(eqn, closed, operands)
         if primitive == "custom_jvp_call":
-            closed = eqn.params["call_jaxpr"]
-            return self._inline(closed.jaxpr, closed.consts, operands)
+            return self._inline(eqn, eqn.params["call_jaxpr"], operands)
         if primitive == "scan":
             return self._loop(eqn, operands)
-        if primitive not in _PRIMITIVES:
-            raise PrintError(f"{source_of(eqn)}: the printer knows no GLSL for the JAX primitive {primitive!r}")
+        if primitive not in PRIMITIVES:
+            raise PrintError(f"{self._where(eqn)}: the printer knows no GLSL for the JAX primitive {primitive!r}")
         try:
-            return [_PRIMITIVES[primitive](self, eqn, *operands)]
+            glsl_type(eqn.outvars[0].aval)
+            return [PRIMITIVES[primitive](self, eqn, *operands)]
         except PrintError as error:
-            raise PrintError(f"{source_of(eqn)}: {primitive}: {error}") from None
+            raise PrintError(f"{self._where(eqn)}: {primitive}: {error}") from None
 
     def _call(self, closed: Any, called: str, operands: list[Value], name: str | None) -> list[Value]:
         glsl_name, params, returned = self.printer.chunk(called, closed)
@@ -322,7 +267,7 @@ class _Body:
         arguments = []
         for root, kind, struct in params:
             taken, rest = (rest[: len(struct.fields)], rest[len(struct.fields) :]) if struct else (rest[:1], rest[1:])
-            arguments.append(_whole(taken, struct) if struct else _lift(taken[0], kind))
+            arguments.append(_whole(taken, struct) if struct else lift(taken[0], kind))
         text = f"{glsl_name}({', '.join(a.text for a in arguments)})"
         reads = frozenset().union(*(a.reads for a in arguments))
         if returned is None:
@@ -335,7 +280,7 @@ class _Body:
         p = eqn.params
         closed, carries = p["jaxpr"], p["num_carry"]
         if len(closed.jaxpr.outvars) != carries or p["reverse"]:
-            raise PrintError(f"{source_of(eqn)}: only a forward scan without stacked outputs prints as a loop")
+            raise PrintError(f"{self._where(eqn)}: only a forward scan without stacked outputs prints as a loop")
         outer, carry, rows = (
             operands[: p["num_consts"]],
             operands[p["num_consts"] : p["num_consts"] + carries],
@@ -344,7 +289,7 @@ class _Body:
         kinds = [glsl_type(v.aval) for v in closed.jaxpr.outvars]
         state = []
         for value, kind in zip(carry, kinds, strict=True):
-            lifted = _lift(value, kind)
+            lifted = lift(value, kind)
             state.append(self.local("total", lifted))
             self.taken.add(state[-1].text)  # written in the loop: never to be reused for anything else
         counter = self.local("k", Value("0", "int"))
@@ -359,7 +304,7 @@ class _Body:
         results = self._walk(frame, closed.jaxpr, named=True)
         self.frames.pop()
         for target, result, kind in zip(state, results, kinds, strict=True):
-            self.lines.append(f"{target.text} = {_lift(result, kind).text};")
+            self.lines.append(f"{target.text} = {lift(result, kind).text};")
         self.lines[start:] = [f"    {line}" for line in self.lines[start:]] + ["}"]
         self.declared = known
         return state
@@ -372,23 +317,13 @@ def _whole(leaves: Sequence[Value], struct: StructType) -> Value:
     root = roots.pop() if len(roots) == 1 else ""
     if root and all(v.text == f"{root}.{name}" for v, (name, _, _) in zip(leaves, struct.fields, strict=True)):
         return Value(root, struct.name, reads=reads)
-    lifted = [_lift(v, kind).text for v, (_, kind, _) in zip(leaves, struct.fields, strict=True)]
+    lifted = [lift(v, kind).text for v, (_, kind, _) in zip(leaves, struct.fields, strict=True)]
     return Value(f"{struct.name}({', '.join(lifted)})", struct.name, reads=reads)
 
 
-def _safe(name: str) -> str:
-    return f"{name}_" if name in _RESERVED or name.startswith("gl_") else name
-
-
-def _lift(value: Value, kind: str) -> Value:
-    """Broadcasts stay scalar until a vector is needed: here it is."""
-    if value.type == kind:
-        return value
-    return Value(f"{kind}({value.text})", kind, reads=value.reads)
-
-
 def _leaves(tree: Any) -> list[tuple[str, Any]]:
-    return [(jax.tree_util.keystr(path, simple=True, separator="."), leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(tree)]
+    leaves = jax.tree_util.tree_leaves_with_path(tree)
+    return [(safe(jax.tree_util.keystr(path, simple=True, separator=".")), leaf) for path, leaf in leaves]
 
 
 def _group(paths: Sequence[str], avals: Sequence[Any]) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -398,7 +333,7 @@ def _group(paths: Sequence[str], avals: Sequence[Any]) -> list[tuple[str, list[t
         root, _, leaf = path.partition(".")
         if not groups or groups[-1][0] != root:
             groups.append((root, []))
-        groups[-1][1].append((leaf, glsl_type(aval)))
+        groups[-1][1].append((safe(leaf), glsl_type(aval)))
     return groups
 
 
@@ -418,169 +353,3 @@ def _struct_text(struct: StructType) -> str:
     width = max(len(kind) + len(name) for name, kind, _ in struct.fields) + 2
     rows = [(f"{kind} {name};", comment) for name, kind, comment in struct.fields]
     return f"struct {struct.name} {{\n" + "".join(f"    {text:<{width}}  // {note}\n" for text, note in rows) + "};\n"
-
-
-def _bracketed(value: Value, binds: int, right: bool) -> str:
-    loose = value.binds > binds or (right and value.binds in (binds, UNARY))
-    return f"({value.text})" if loose else value.text
-
-
-def _reads(*values: Value) -> frozenset[str]:
-    return frozenset().union(*(v.reads for v in values))
-
-
-def _wider(*values: Value) -> str:
-    return max((v.type for v in values), key=lambda kind: (kind[-1].isdigit(), kind))
-
-
-def _operator(symbol: str, binds: int, neutral: str | None = None, neutral_left: bool = False):
-    def write(body: _Body, eqn: Any, a: Value, b: Value) -> Value:
-        if b.text == neutral:
-            return a
-        if a.text == neutral and neutral_left:
-            return b
-        text = f"{_bracketed(a, binds, False)} {symbol} {_bracketed(b, binds, True)}"
-        return Value(text, _wider(a, b), binds, _reads(a, b))
-
-    return write
-
-
-def _function(name: str, lift: bool = False):
-    def write(body: _Body, eqn: Any, *args: Value) -> Value:
-        kind = _wider(*args)
-        if lift:
-            args = tuple(_lift(a, kind) for a in args)
-        elif len(args) > 1 and not args[0].type == kind:  # max(float, vec3) does not exist; max(vec3, float) does
-            args = (args[1], args[0])
-        return Value(f"{name}({', '.join(a.text for a in args)})", kind, reads=_reads(*args))
-
-    return write
-
-
-def _helper(name: str):
-    def write(body: _Body, eqn: Any, *args: Value) -> Value:
-        body.printer.helpers[name] = HELPERS[name]
-        return Value(f"{PREFIX}{name}({', '.join(a.text for a in args)})", _wider(*args), reads=_reads(*args))
-
-    return write
-
-
-def _comparison(symbol: str, vector_name: str):
-    def write(body: _Body, eqn: Any, a: Value, b: Value) -> Value:
-        kind = _wider(a, b)
-        if not kind[-1].isdigit():
-            text = f"{_bracketed(a, COMPARISON, False)} {symbol} {_bracketed(b, COMPARISON, True)}"
-            return Value(text, "bool", COMPARISON, _reads(a, b))
-        a, b = _lift(a, kind), _lift(b, kind)
-        return Value(f"{vector_name}({a.text}, {b.text})", f"bvec{kind[-1]}", reads=_reads(a, b))
-
-    return write
-
-
-def _select(body: _Body, eqn: Any, which: Value, *cases: Value) -> Value:
-    if len(cases) != 2:
-        raise PrintError("a choice between more than two values")
-    kind = _wider(*cases)
-    if which.type != "bool" and not kind[-1].isdigit():
-        kind = f"vec{which.type[-1]}"
-    no, yes = (_lift(case, kind) for case in cases)
-    if which.type == "bool":
-        parts = [_bracketed(v, CHOICE, True) for v in (which, yes, no)]
-        return Value(f"{parts[0]} ? {parts[1]} : {parts[2]}", kind, CHOICE, _reads(which, no, yes))
-    return Value(f"mix({no.text}, {yes.text}, {which.text})", kind, reads=_reads(which, no, yes))
-
-
-def _passes(body: _Body, eqn: Any, a: Value) -> Value:
-    return a
-
-
-def _convert(body: _Body, eqn: Any, a: Value) -> Value:
-    kind = _SCALAR_TYPES[np.dtype(eqn.params["new_dtype"]).kind]
-    kind = kind if not a.type[-1].isdigit() else f"{_VECTOR_TYPES[kind]}{a.type[-1]}"
-    return a if kind == a.type else Value(f"{kind}({a.text})", kind, reads=a.reads)
-
-
-def _negate(body: _Body, eqn: Any, a: Value) -> Value:
-    return Value(f"-{_bracketed(a, UNARY, True)}", a.type, UNARY, a.reads)
-
-
-def _slice(body: _Body, eqn: Any, a: Value) -> Value:
-    start, limit = eqn.params["start_indices"][0], eqn.params["limit_indices"][0]
-    if not a.type[-1].isdigit():
-        return a
-    size = limit - start
-    kind = _base_type(a.type) if size == 1 else f"{a.type[:-1]}{size}"
-    return Value(f"{_bracketed(a, ATOM, False)}.{'xyzw'[start:limit]}", kind, reads=a.reads)
-
-
-def _build(body: _Body, eqn: Any, *parts: Value) -> Value:
-    kind = glsl_type(eqn.outvars[0].aval)
-    return Value(f"{kind}({', '.join(p.text for p in parts)})", kind, reads=_reads(*parts))
-
-
-def _sum(body: _Body, eqn: Any, a: Value) -> Value:
-    size = eqn.invars[0].aval.shape[0]
-    kind = f"vec{size}"
-    return Value(f"dot({_lift(a, kind).text}, {kind}(1.0))", "float", reads=a.reads)
-
-
-def _dot(body: _Body, eqn: Any, a: Value, b: Value) -> Value:
-    if eqn.params["dimension_numbers"] != (((0,), (0,)), ((), ())):
-        raise PrintError("only the dot product of two vectors has a GLSL form")
-    kind = glsl_type(eqn.invars[0].aval)
-    return Value(f"dot({_lift(a, kind).text}, {_lift(b, kind).text})", "float", reads=_reads(a, b))
-
-
-def _integer_power(body: _Body, eqn: Any, a: Value) -> Value:
-    y = eqn.params.get("y", 2)
-    if not re.fullmatch(r"[\w.]+", a.text):
-        a = body.local("t", a)
-    product = " * ".join([a.text] * abs(y))
-    if y < 0:
-        return Value(f"1.0 / ({product})" if y < -1 else f"1.0 / {product}", a.type, PRODUCT, a.reads)
-    return Value(product, a.type, PRODUCT if y > 1 else ATOM, a.reads)
-
-
-def _clamp(body: _Body, eqn: Any, low: Value, x: Value, high: Value) -> Value:
-    kind = _wider(low, x, high)
-    low, x, high = (_lift(v, kind) for v in (low, x, high))
-    return Value(f"clamp({x.text}, {low.text}, {high.text})", kind, reads=_reads(low, x, high))
-
-
-_PRIMITIVES: dict[str, Callable[..., Value]] = {
-    "add": _operator("+", SUM, "0.0", neutral_left=True),
-    "sub": _operator("-", SUM, "0.0"),
-    "mul": _operator("*", PRODUCT, "1.0", neutral_left=True),
-    "div": _operator("/", PRODUCT, "1.0"),
-    "neg": _negate,
-    "max": _function("max"),
-    "min": _function("min"),
-    "pow": _function("pow", lift=True),
-    **{name: _function(name) for name in ("exp", "exp2", "log", "sqrt", "sin", "cos", "tan", "tanh", "abs", "sign", "floor", "ceil")},
-    "rsqrt": _function("inversesqrt"),
-    **{name: _helper(name) for name in ("erf", "expm1", "log1p", "atan2")},
-    "integer_pow": _integer_power,
-    "square": _integer_power,
-    "clamp": _clamp,
-    "gt": _comparison(">", "greaterThan"),
-    "ge": _comparison(">=", "greaterThanEqual"),
-    "lt": _comparison("<", "lessThan"),
-    "le": _comparison("<=", "lessThanEqual"),
-    "eq": _comparison("==", "equal"),
-    "ne": _comparison("!=", "notEqual"),
-    "and": _operator("&&", LOGIC),
-    "or": _operator("||", LOGIC),
-    "not": lambda body, eqn, a: Value(f"!{_bracketed(a, UNARY, True)}", a.type, UNARY, a.reads),
-    "select_n": _select,
-    "broadcast_in_dim": _passes,
-    "reshape": _passes,
-    "squeeze": _passes,
-    "copy": _passes,
-    "stop_gradient": _passes,
-    "convert_element_type": _convert,
-    "slice": _slice,
-    "concatenate": _build,
-    "stack": _build,
-    "reduce_sum": _sum,
-    "dot_general": _dot,
-}

@@ -1,24 +1,24 @@
 """Diffuse boundaries: light that has lost its direction below the surface."""
 
-from typing import Self
+from typing import Any, Self
 
 import jax.numpy as jnp
 
 from .._chunk import chunk, safe_divide, safe_sqrt, static
 from .._fields import choice, layer, param
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Number, Scalar, Vec3
 
 
-def _albedo() -> Colour:
-    return param(0.5, 0.0, 1.0, "linear", "part of the light that is sent back", colour=True)
+def _albedo() -> Any:
+    return param(default=0.5, lower=0.0, upper=1.0, scale="linear", doc="part of the light that is sent back", colour=True)
 
 
 @layer
 class Lambert:
     """An ideally diffuse boundary: the same radiance in every direction (Lambert 1760)."""
 
-    name: str = static("base", doc="name of the layer")
-    albedo: Colour = _albedo()
+    name: str = static(default="base", doc="name of the layer")
+    albedo: Number = _albedo()
 
     def below(self, n: Scalar) -> Self:
         """The same boundary: a medium above does not change it."""
@@ -78,10 +78,12 @@ def oren_nayar_full(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour
 class OrenNayar:
     """A rough diffuse boundary: V-grooves of Lambertian facets (Oren and Nayar 1994)."""
 
-    name: str = static("base", doc="name of the layer")
-    albedo: Colour = _albedo()
-    sigma: Scalar = param(0.3, 0.0, 1.2, "softlog", "standard deviation of the facet angle", unit="rad", soft=0.1)
-    form: str = choice("full", "qualitative", doc="with one interreflection, or the short form")
+    name: str = static(default="base", doc="name of the layer")
+    albedo: Number = _albedo()
+    sigma: Number = param(
+        default=0.3, lower=0.0, upper=1.2, scale="softlog", doc="standard deviation of the facet angle", unit="rad", soft=0.1
+    )
+    form: str = choice(default="full", others=("qualitative",), doc="with one interreflection, or the short form")
 
     def below(self, n: Scalar) -> Self:
         """The same boundary: a medium above does not change it."""

@@ -1,23 +1,23 @@
 """Rough boundaries made of microfacets: metal and dielectric."""
 
 from dataclasses import replace
-from typing import Self
+from typing import Any, Self
 
 from .._chunk import static
 from .._fields import choice, layer, param
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Number, Scalar, Vec3
 from ..optics.fresnel import conductor_f0, dielectric_f0, fresnel_conductor, fresnel_dielectric
-from ..optics.microfacet import Width, density, half_cosine, half_vector, visibility
+from ..optics.microfacet import Distribution, Masking, Width, density, half_cosine, half_vector, visibility
 
 
 class Microfacets:
     """A boundary whose facets have a width: one `alpha`, or `alpha_x` along the tangent and `alpha_y` across it."""
 
-    alpha: Scalar | None
-    alpha_x: Scalar | None
-    alpha_y: Scalar | None
-    distribution: str
-    masking: str
+    alpha: Number
+    alpha_x: Number
+    alpha_y: Number
+    distribution: Distribution
+    masking: Masking
 
     @property
     def width(self) -> Width:
@@ -25,6 +25,11 @@ class Microfacets:
 
     def fresnel(self, c: Scalar) -> Colour:
         """Reflectance of one facet at the cosine `c`."""
+        raise NotImplementedError
+
+    @property
+    def f0(self) -> Colour:
+        """Reflectance of one facet at normal incidence."""
         raise NotImplementedError
 
     def density(self, h: Vec3, width: Width | None = None) -> Scalar:
@@ -43,8 +48,10 @@ class Microfacets:
         return F * D * V
 
 
-def alpha_param(default: float | None, which: str) -> float | None:
-    return param(default, 1e-3, 1.0, "log", f"width of the facet slopes{which}; the square of an artist's roughness")
+def alpha_param(*, default: float | None, which: str) -> Any:
+    """Declare the width of facets, on both axes or on one."""
+    doc = f"width of the facet slopes{which}; the square of an artist's roughness"
+    return param(default=default, lower=1e-3, upper=1.0, scale="log", doc=doc)
 
 
 @layer
@@ -54,14 +61,24 @@ class Conductor(Microfacets):
     `eta` and `k` are absolute (against air); a coat above divides them by its own index.
     """
 
-    name: str = static("base", doc="name of the layer")
-    alpha: Scalar | None = alpha_param(0.2, "")
-    alpha_x: Scalar | None = alpha_param(None, " along the tangent")
-    alpha_y: Scalar | None = alpha_param(None, " across the tangent")
-    eta: Colour = param(0.2, 0.02, 10.0, "log", "index of refraction, real part", colour=True, fitted=False)
-    k: Colour = param(3.5, 0.0, 15.0, "softlog", "index of refraction, imaginary part", colour=True, fitted=False)
-    distribution: str = choice("ggx", "beckmann", doc="density of the facet normals")
-    masking: str = choice("smith", "smith_separable", "vcavity", doc="how facets hide one another")
+    name: str = static(default="base", doc="name of the layer")
+    alpha: Number = alpha_param(default=0.2, which="")
+    alpha_x: Number = alpha_param(default=None, which=" along the tangent")
+    alpha_y: Number = alpha_param(default=None, which=" across the tangent")
+    eta: Number = param(
+        default=0.2, lower=0.02, upper=10.0, scale="log", doc="index of refraction, real part", colour=True, fitted=False
+    )
+    k: Number = param(
+        default=3.5,
+        lower=0.0,
+        upper=15.0,
+        scale="softlog",
+        doc="index of refraction, imaginary part",
+        colour=True,
+        fitted=False,
+    )
+    distribution: Distribution = choice(default="ggx", others=("beckmann",), doc="density of the facet normals")
+    masking: Masking = choice(default="smith", others=("smith_separable", "vcavity"), doc="how facets hide one another")
 
     def below(self, n: Scalar) -> Self:
         """The same metal under a medium of index `n`."""
@@ -79,13 +96,13 @@ class Conductor(Microfacets):
 class Dielectric(Microfacets):
     """A rough boundary to a clear or black medium of real index; what passes it is lost."""
 
-    name: str = static("base", doc="name of the layer")
-    alpha: Scalar | None = alpha_param(0.2, "")
-    alpha_x: Scalar | None = alpha_param(None, " along the tangent")
-    alpha_y: Scalar | None = alpha_param(None, " across the tangent")
-    eta: Colour = param(1.5, 1.0, 4.0, "linear", "index of refraction", colour=True)
-    distribution: str = choice("ggx", "beckmann", doc="density of the facet normals")
-    masking: str = choice("smith", "smith_separable", "vcavity", doc="how facets hide one another")
+    name: str = static(default="base", doc="name of the layer")
+    alpha: Number = alpha_param(default=0.2, which="")
+    alpha_x: Number = alpha_param(default=None, which=" along the tangent")
+    alpha_y: Number = alpha_param(default=None, which=" across the tangent")
+    eta: Number = param(default=1.5, lower=1.0, upper=4.0, scale="linear", doc="index of refraction", colour=True)
+    distribution: Distribution = choice(default="ggx", others=("beckmann",), doc="density of the facet normals")
+    masking: Masking = choice(default="smith", others=("smith_separable", "vcavity"), doc="how facets hide one another")
 
     def below(self, n: Scalar) -> Self:
         """The same medium under one of index `n`."""

@@ -1,0 +1,52 @@
+# `make demo` and `make test` set up what they need. PYTHON=python3.12 chooses the interpreter.
+PYTHON ?=
+export PYTHON
+BIN := .venv/bin
+PYTEST_ARGS ?=
+UPGRADE ?=
+LOCK := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --annotation-style line
+
+.DEFAULT_GOAL := help
+.PHONY: demo test run dev lint pytest wheel format lock clean help
+
+demo: run  ## fit a layered material to a render and print a verified shader, into out/demo
+	$(BIN)/layerfit demo -o out/demo
+
+test: lint pytest wheel  ## everything that has to hold before a change lands
+
+run:  # .venv, to run layerfit
+	@sh tools/setup.sh run
+
+dev:  ## .venv, to work on layerfit
+	@sh tools/setup.sh dev
+
+lint: dev  ## style and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+
+pytest: dev  ## the tests, on the source tree; PYTEST_ARGS="-k fresnel" for some of them
+	$(BIN)/pytest --numprocesses auto --dist worksteal $(PYTEST_ARGS)
+
+wheel: dev  ## build the wheel and run the tests marked `wheel` on it, away from the source tree
+	rm -rf dist
+	$(BIN)/python -m build --no-isolation --outdir dist >/dev/null
+	@sh tools/setup.sh wheel
+	.venv-wheel/bin/pytest -m wheel $$(grep -l 'mark\.wheel' tests/test_*.py)
+
+format: dev  ## put the sources in form
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lock:  ## lock the packages that pyproject.toml names (needs uv); UPGRADE=--upgrade for newer ones
+	$(LOCK) $(UPGRADE) pyproject.toml -o requirements/run.txt
+	$(LOCK) $(UPGRADE) -c requirements/run.txt --group build -o requirements/build.txt
+	$(LOCK) $(UPGRADE) -c requirements/run.txt --group wheel -o requirements/wheel.txt
+	$(LOCK) $(UPGRADE) -c requirements/run.txt -c requirements/build.txt -c requirements/wheel.txt \
+		pyproject.toml --extra plot --group dev -o requirements/dev.txt
+
+clean:  ## remove what make made
+	rm -rf .venv .venv-wheel dist out .pytest_cache .ruff_cache .hypothesis
+
+help:  ## this list
+	@sed -n 's/^\([a-z]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10

@@ -1,0 +1,185 @@
+"""The JAX primitives that print, each as the GLSL that computes the same."""
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .glsl import (
+    ATOM,
+    CHOICE,
+    COMPARISON,
+    LOGIC,
+    PREFIX,
+    PRODUCT,
+    SCALAR_TYPES,
+    SUM,
+    UNARY,
+    VECTOR_TYPES,
+    PrintError,
+    Value,
+    base_type,
+    bracketed,
+    glsl_type,
+    lift,
+    reads,
+    wider,
+)
+from .helpers import HELPERS
+
+if TYPE_CHECKING:
+    from .printer import Body
+
+
+def _operator(symbol: str, binds: int, neutral: str | None = None, neutral_left: bool = False):
+    def write(body: "Body", eqn: Any, a: Value, b: Value) -> Value:
+        if b.text == neutral:
+            return a
+        if a.text == neutral and neutral_left:
+            return b
+        text = f"{bracketed(a, binds, False)} {symbol} {bracketed(b, binds, True)}"
+        return Value(text, wider(a, b), binds, reads(a, b))
+
+    return write
+
+
+def _function(name: str, lifted: bool = False):
+    def write(body: "Body", eqn: Any, *args: Value) -> Value:
+        kind = wider(*args)
+        if lifted:
+            args = tuple(lift(a, kind) for a in args)
+        elif len(args) > 1 and args[0].type != kind:  # max(float, vec3) does not exist; max(vec3, float) does
+            args = (args[1], args[0])
+        return Value(f"{name}({', '.join(a.text for a in args)})", kind, reads=reads(*args))
+
+    return write
+
+
+def _helper(name: str):
+    def write(body: "Body", eqn: Any, *args: Value) -> Value:
+        body.printer.helpers[name] = HELPERS[name]
+        return Value(f"{PREFIX}{name}({', '.join(a.text for a in args)})", wider(*args), reads=reads(*args))
+
+    return write
+
+
+def _comparison(symbol: str, vector_name: str):
+    def write(body: "Body", eqn: Any, a: Value, b: Value) -> Value:
+        kind = wider(a, b)
+        if not kind[-1].isdigit():
+            text = f"{bracketed(a, COMPARISON, False)} {symbol} {bracketed(b, COMPARISON, True)}"
+            return Value(text, "bool", COMPARISON, reads(a, b))
+        a, b = lift(a, kind), lift(b, kind)
+        return Value(f"{vector_name}({a.text}, {b.text})", f"bvec{kind[-1]}", reads=reads(a, b))
+
+    return write
+
+
+def _select(body: "Body", eqn: Any, which: Value, *cases: Value) -> Value:
+    if len(cases) != 2:
+        raise PrintError("a choice between more than two values")
+    kind = wider(*cases)
+    if which.type != "bool" and not kind[-1].isdigit():
+        kind = f"vec{which.type[-1]}"
+    no, yes = (lift(case, kind) for case in cases)
+    if which.type == "bool":
+        parts = [bracketed(v, CHOICE, True) for v in (which, yes, no)]
+        return Value(f"{parts[0]} ? {parts[1]} : {parts[2]}", kind, CHOICE, reads(which, no, yes))
+    return Value(f"mix({no.text}, {yes.text}, {which.text})", kind, reads=reads(which, no, yes))
+
+
+def _passes(body: "Body", eqn: Any, a: Value) -> Value:
+    return a
+
+
+def _convert(body: "Body", eqn: Any, a: Value) -> Value:
+    kind = SCALAR_TYPES[np.dtype(eqn.params["new_dtype"]).kind]
+    kind = kind if not a.type[-1].isdigit() else f"{VECTOR_TYPES[kind]}{a.type[-1]}"
+    return a if kind == a.type else Value(f"{kind}({a.text})", kind, reads=a.reads)
+
+
+def _negate(body: "Body", eqn: Any, a: Value) -> Value:
+    return Value(f"-{bracketed(a, UNARY, True)}", a.type, UNARY, a.reads)
+
+
+def _slice(body: "Body", eqn: Any, a: Value) -> Value:
+    start, limit = eqn.params["start_indices"][0], eqn.params["limit_indices"][0]
+    if not a.type[-1].isdigit():
+        return a
+    size = limit - start
+    kind = base_type(a.type) if size == 1 else f"{a.type[:-1]}{size}"
+    return Value(f"{bracketed(a, ATOM, False)}.{'xyzw'[start:limit]}", kind, reads=a.reads)
+
+
+def _build(body: "Body", eqn: Any, *parts: Value) -> Value:
+    kind = glsl_type(eqn.outvars[0].aval)
+    return Value(f"{kind}({', '.join(p.text for p in parts)})", kind, reads=reads(*parts))
+
+
+def _sum(body: "Body", eqn: Any, a: Value) -> Value:
+    size = eqn.invars[0].aval.shape[0]
+    kind = f"vec{size}"
+    return Value(f"dot({lift(a, kind).text}, {kind}(1.0))", "float", reads=a.reads)
+
+
+def _dot(body: "Body", eqn: Any, a: Value, b: Value) -> Value:
+    if eqn.params["dimension_numbers"] != (((0,), (0,)), ((), ())):
+        raise PrintError("only the dot product of two vectors has a GLSL form")
+    kind = glsl_type(eqn.invars[0].aval)
+    return Value(f"dot({lift(a, kind).text}, {lift(b, kind).text})", "float", reads=reads(a, b))
+
+
+def _integer_power(body: "Body", eqn: Any, a: Value) -> Value:
+    y = eqn.params.get("y", 2)
+    if not re.fullmatch(r"[\w.]+", a.text):
+        a = body.local("t", a)
+    product = " * ".join([a.text] * abs(y))
+    if y < 0:
+        return Value(f"1.0 / ({product})" if y < -1 else f"1.0 / {product}", a.type, PRODUCT, a.reads)
+    return Value(product, a.type, PRODUCT if y > 1 else ATOM, a.reads)
+
+
+def _clamp(body: "Body", eqn: Any, low: Value, x: Value, high: Value) -> Value:
+    kind = wider(low, x, high)
+    low, x, high = (lift(v, kind) for v in (low, x, high))
+    return Value(f"clamp({x.text}, {low.text}, {high.text})", kind, reads=reads(low, x, high))
+
+
+PRIMITIVES: dict[str, Callable[..., Value]] = {
+    "add": _operator("+", SUM, "0.0", neutral_left=True),
+    "sub": _operator("-", SUM, "0.0"),
+    "mul": _operator("*", PRODUCT, "1.0", neutral_left=True),
+    "div": _operator("/", PRODUCT, "1.0"),
+    "neg": _negate,
+    "max": _function("max"),
+    "min": _function("min"),
+    "pow": _function("pow", lifted=True),
+    **{name: _function(name) for name in ("exp", "exp2", "log", "sqrt", "sin", "cos", "tan", "abs", "sign", "floor", "ceil")},
+    "rsqrt": _function("inversesqrt"),
+    **{name: _helper(name) for name in ("erf", "expm1", "log1p", "atan2")},
+    "integer_pow": _integer_power,
+    "square": _integer_power,
+    "clamp": _clamp,
+    "gt": _comparison(">", "greaterThan"),
+    "ge": _comparison(">=", "greaterThanEqual"),
+    "lt": _comparison("<", "lessThan"),
+    "le": _comparison("<=", "lessThanEqual"),
+    "eq": _comparison("==", "equal"),
+    "ne": _comparison("!=", "notEqual"),
+    "and": _operator("&&", LOGIC),
+    "or": _operator("||", LOGIC),
+    "not": lambda body, eqn, a: Value(f"!{bracketed(a, UNARY, True)}", a.type, UNARY, a.reads),
+    "select_n": _select,
+    "broadcast_in_dim": _passes,
+    "reshape": _passes,
+    "squeeze": _passes,
+    "copy": _passes,
+    "stop_gradient": _passes,
+    "convert_element_type": _convert,
+    "slice": _slice,
+    "concatenate": _build,
+    "stack": _build,
+    "reduce_sum": _sum,
+    "dot_general": _dot,
+}

@@ -1,0 +1,75 @@
+"""What every test shares: double precision, shape checks, the GL context, and the folders of data outside the repository."""
+
+import importlib.util
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import jax
+import jaxtyping
+import pytest
+from jax.extend import source_info_util
+
+if TYPE_CHECKING:
+    import moderngl
+
+REPOSITORY = Path(__file__).parents[1]
+
+# Rounding is then out of the way of what is tested, and code that is meant for float32 has to say so.
+jax.config.update("jax_enable_x64", True)
+
+# The shapes in signatures are checked while the tests run. Without beartype, the package is tested as its users have it.
+if importlib.util.find_spec("beartype"):
+    jaxtyping.install_import_hook(["layerfit.optics"], "beartype.beartype")
+    # The checks wrap every function; without this the printer would take their lines for the user's and name values after them.
+    source_info_util.register_exclusion(os.path.dirname(jaxtyping.__file__))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update-golden", action="store_true", help="rewrite the printed shaders in tests/golden")
+
+
+def pytest_report_header() -> str:
+    spec = importlib.util.find_spec("layerfit")
+    return f"layerfit: {spec.origin if spec else 'not installed'}, JAX {jax.__version__}"
+
+
+@pytest.fixture(scope="session")
+def gl() -> "Iterator[moderngl.Context]":
+    """The OpenGL context that shaders are rendered in. A test that needs it fails where there is no driver."""
+    from layerfit.errors import MachineError
+    from layerfit.shader.gl import context
+
+    try:
+        ctx = context()
+    except MachineError as error:
+        pytest.fail(str(error), pytrace=False)
+    yield ctx
+    assert ctx.error == "GL_NO_ERROR"
+
+
+@pytest.fixture(scope="session")
+def references() -> Path:
+    """Renders of known materials by other renderers."""
+    return _folder("references")
+
+
+@pytest.fixture(scope="session")
+def oracle() -> Path:
+    """Values of the formulas in many digits, and of an independent random walk."""
+    return _folder("oracle")
+
+
+@pytest.fixture(scope="session")
+def measured() -> Path:
+    """Measured and published reflectances."""
+    return _folder("measured")
+
+
+def _folder(name: str) -> Path:
+    variable = f"LAYERFIT_{name.upper()}"
+    folder = Path(os.environ.get(variable) or REPOSITORY.parent / "shared" / name)
+    if not folder.is_dir():
+        pytest.skip(f"no folder {folder}: set {variable} to where the {name} data are")
+    return folder

@@ -1,0 +1,232 @@
+#version 330 core
+// corrected over lambert: Coat over Lambert.
+// Printed by layerfit 0.1.0 from its corrected form.
+// Left out, because this material does without: coat: anisotropy.
+//
+// vec3 lf_brdf(vec3 n, vec3 v, vec3 l) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
+// the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
+// Define LF_LIBRARY to take the functions without the entry point below.
+
+struct Coat {
+    float alpha;  // width of the facet slopes; the square of an artist's roughness
+    float eta;    // index of refraction, against air
+    vec3 tau;     // optical depth, one way at normal incidence
+};
+
+struct Interface {
+    float n;            // index of the medium below, against air
+    float alpha;        // width of the facets, mean of the axes
+    float tilt;         // turn of the mean facet towards a grazing direction
+    float gain;         // part of the reflected light that a second facet lets in
+    float lengthening;  // path added by the spread of refracted directions, in thicknesses
+    float drift;        // scale of the path added at grazing angles
+};
+
+struct Lambert {
+    vec3 albedo;  // part of the light that is sent back
+};
+
+struct Crossing {
+    vec3 w;             // direction in the medium below
+    float T;            // energy that passes
+    float spread;       // width of the refracted directions over that of the facets
+    float lengthening;  // path beyond that of the refracted direction, in thicknesses
+    float drift;        // the part of it due to grazing incidence
+};
+
+const Coat lf_coat = Coat(
+    0.1,                   // alpha: width of the facet slopes; the square of an artist's roughness
+    1.5,                   // eta: index of refraction, against air
+    vec3(0.05, 0.2, 0.6)   // tau: optical depth, one way at normal incidence
+);
+
+const Interface lf_coat_interface = Interface(
+    1.5,           // n: index of the medium below, against air
+    0.1,           // alpha: width of the facets, mean of the axes
+    0.024779007,   // tilt: turn of the mean facet towards a grazing direction
+    0.036722906,   // gain: part of the reflected light that a second facet lets in
+    0.0025420089,  // lengthening: path added by the spread of refracted directions, in thicknesses
+    0.6249986      // drift: scale of the path added at grazing angles
+);
+
+const Lambert lf_base = Lambert(
+    vec3(0.5, 0.28, 0.13)   // albedo: part of the light that is sent back
+);
+
+const vec3 lf_base_returned = vec3(1.3041564, 1.076677, 1.008228);
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+}
+
+// Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
+float lf_fresnel_dielectric(float c, float eta) {
+    float delta = (eta - 1.0) * (eta + 1.0);
+    float g2 = delta + c * c;
+    bool refracts = g2 > 1e-08;
+    float g = sqrt(refracts ? g2 : 1.0);
+    float eta2 = eta * eta;
+    float perpendicular = (c + g) * (c + g);
+    float parallel = (eta2 * c + g) * (eta2 * c + g);
+    float rs = -delta / perpendicular;
+    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float reflectance = 0.5 * (rs * rs + rp * rp);
+    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec3 lf_half_vector(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return s / sqrt(max(dot(s, s), 1e-20));
+}
+
+// GGX density of facet normals (Walter et al. 2007, eq. 33).
+float lf_ggx_d(vec3 h, float alpha) {
+    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
+    float root = 1.0 / (e * alpha);
+    return root * root / 3.1415927;
+}
+
+// NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
+float lf_ggx_projection(vec3 w, float alpha) {
+    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
+// Cosine between a direction and the facets that it meets.
+float lf_facet_cosine(vec3 w, float tilt) {
+    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
+float lf_transmittance_dielectric(float c, float eta) {
+    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float eta2 = eta * eta;
+    float perpendicular = c + g;
+    float parallel = eta2 * c + g;
+    float product = 2.0 * c * g;
+    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
+    return eta == 1.0 ? 1.0 : passed;
+}
+
+// Energy that passes a rough interface, from the facet cosine; `gain` is `second_facet`.
+float lf_rough_transmittance(float c, float eta, float gain) {
+    float T = lf_transmittance_dielectric(c, eta);
+    return T + (1.0 - T) * gain;
+}
+
+// Path added near grazing angles, where the facets that face the light take most of it.
+float lf_drift(vec3 w, float scale, float alpha) {
+    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+}
+
+// Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
+vec3 lf_refract_about_normal(vec3 w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
+    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+}
+
+// Width of the refracted directions over the width of the facets, to first order in slope.
+float lf_slope_spread(float c, float eta) {
+    float delta = (eta - 1.0) * (eta + 1.0);
+    float g = sqrt(max(delta + c * c, 0.0));
+    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
+}
+
+// Follow one direction through a rough interface of relative index eta; `air` is the direction above all of them.
+Crossing lf_cross(Interface interface_, float eta, vec3 w, vec3 air) {
+    float c = lf_facet_cosine(w, interface_.tilt);
+    float c_energy = eta >= 1.0 ? c : w.z;
+    float T = lf_rough_transmittance(c_energy, eta, interface_.gain);
+    float grazing = lf_drift(w, interface_.drift, interface_.alpha);
+    vec3 below = lf_refract_about_normal(air, interface_.n);
+    return Crossing(below, T, lf_slope_spread(c, eta), interface_.lengthening + grazing, grazing);
+}
+
+// Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
+vec3 lf_transmittance(vec3 tau, float path) {
+    return exp(-(tau * path));
+}
+
+// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
+vec3 lf_evaluate(vec3 wi, vec3 wo) {
+    bool lit = wi.z > 0.0 && wo.z > 0.0;
+    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
+    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_coat.eta);
+    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_coat.alpha);
+    float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
+    float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
+    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float f = F * D * V;
+    Crossing i = lf_cross(lf_coat_interface, lf_coat.eta, wi, wi);
+    Crossing o = lf_cross(lf_coat_interface, lf_coat.eta, wo, wo);
+    float throughput = i.T * o.T / (lf_coat.eta * lf_coat.eta);
+    float straight = 1.0 / max(i.w.z, 1e-14) + 1.0 / max(o.w.z, 1e-14);
+    float added = i.lengthening + o.lengthening;
+    vec3 diffuse = lf_transmittance(lf_coat.tau, straight + added);
+    vec3 reflected = lf_base.albedo / 3.1415927 * lf_base_returned;
+    vec3 base = throughput * diffuse * reflected;
+    return lit ? f + base : vec3(0.0);
+}
+
+// BRDF [1/sr] in any frame.
+vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
+    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
+    return lf_evaluate(surface * l, surface * v);
+}
+#ifndef LF_LIBRARY
+
+#ifndef LF_LIGHTS
+#define LF_LIGHTS 1
+#endif
+
+in vec3 v_position;
+in vec3 v_normal;
+out vec4 color;
+
+uniform vec3 u_eye;
+// A light's direction (w = 0) or position (w = 1), and its irradiance or its intensity per steradian.
+uniform vec4 u_light[LF_LIGHTS];
+uniform vec3 u_light_rgb[LF_LIGHTS];
+
+// Unit direction l to a light and the irradiance on a surface that faces it.
+vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
+    vec3 away = light.xyz - position * light.w;
+    float distance2 = dot(away, away);
+    l = away * inversesqrt(distance2);
+    return rgb / (light.w > 0.0 ? distance2 : 1.0);
+}
+// Linear radiance, or sRGB (IEC 61966-2-1) for a screen when LF_SRGB is defined.
+vec3 lf_output(vec3 radiance) {
+#ifdef LF_SRGB
+    vec3 x = clamp(radiance, 0.0, 1.0);
+    return mix(12.92 * x, 1.055 * pow(max(x, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
+#else
+    return radiance;
+#endif
+}
+void main() {
+    vec3 n = normalize(v_normal);
+    vec3 v = normalize(u_eye - v_position);
+    vec3 radiance = vec3(0.0);
+    for (int k = 0; k < LF_LIGHTS; ++k) {
+        vec3 l;
+        vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
+        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+    }
+    color = vec4(lf_output(radiance), 1.0);
+}
+
+#endif
