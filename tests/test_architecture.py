@@ -26,7 +26,14 @@ LADDER = [
 
 BRANCHES = [
     [{"capture"}, {"render"}, {"fit"}],
-    [{"shader.helpers", "shader.names"}, {"shader.printer"}, {"shader.export"}, {"shader.gl"}, {"shader.verify"}],
+    [
+        {"shader.glsl", "shader.helpers", "shader.names"},
+        {"shader.primitives"},
+        {"shader.printer"},
+        {"shader.export"},
+        {"shader.gl"},
+        {"shader.verify"},
+    ],
 ]
 """Two ladders that stand on the first and never import each other."""
 

@@ -15,7 +15,8 @@ def lines(document: Mapping[str, Any]) -> list[str]:
         {
             "converged": "yes" if d["converged"] else "NO",
             "flags": ", ".join(d["flags"]) or "none",
-            "error": f"{error['rel_l2']:.3g} relative L2, PSNR {error['psnr_db']:.1f} dB, SSIM {error['ssim']:.4f}, delta E 2000 {error['delta_e']:.2f}",
+            "error": f"{error['rel_l2']:.3g} relative L2, PSNR {error['psnr_db']:.1f} dB, SSIM {error['ssim']:.4f}, "
+            f"delta E 2000 {error['delta_e']:.2f}",
             "pixels": f"{d['pixels']['used']} used{_dropped(d['pixels']['dropped'])}",
             "starts": f"{d['starts']}, of which {_same_minimum(d['minima'])} reached this minimum",
         }

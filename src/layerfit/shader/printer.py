@@ -265,7 +265,7 @@ class Body:
         glsl_name, params, returned = self.printer.chunk(called, closed)
         rest = list(operands)
         arguments = []
-        for root, kind, struct in params:
+        for _, kind, struct in params:
             taken, rest = (rest[: len(struct.fields)], rest[len(struct.fields) :]) if struct else (rest[:1], rest[1:])
             arguments.append(_whole(taken, struct) if struct else lift(taken[0], kind))
         text = f"{glsl_name}({', '.join(a.text for a in arguments)})"
