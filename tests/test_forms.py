@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import itertools
 import json
 
 import jax
@@ -271,7 +272,7 @@ def test_a_thicker_coat_is_darker():
         brdf_rows(Stack((varnish(tau=t),), Conductor(alpha=0.2, **COPPER)).astype(np.float64), wi, wo)
         for t in (0.0, 0.1, 1.0, 10.0)
     ]
-    for thin, thick in zip(values, values[1:], strict=False):
+    for thin, thick in itertools.pairwise(values):
         assert np.all(np.asarray(thick) <= np.asarray(thin))
 
 

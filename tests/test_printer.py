@@ -260,7 +260,7 @@ def test_reserved_words(gl):
         pair = reserved_words(a, b[0])
         return pair.sample * pair.input
 
-    gpu, wanted, source = run_both(fn, UNIT, UNIT[::-1])
+    gpu, wanted, _ = run_both(fn, UNIT, UNIT[::-1])
     np.testing.assert_allclose(gpu, wanted, rtol=1e-6)
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,12 +28,9 @@ from .glsl import (
 )
 from .helpers import HELPERS
 
-if TYPE_CHECKING:
-    from .printer import Body
-
 
 def _operator(symbol: str, binds: int, neutral: str | None = None, neutral_left: bool = False):
-    def write(body: "Body", eqn: Any, a: Value, b: Value) -> Value:
+    def write(body: Any, eqn: Any, a: Value, b: Value) -> Value:
         if b.text == neutral:
             return a
         if a.text == neutral and neutral_left:
@@ -45,7 +42,7 @@ def _operator(symbol: str, binds: int, neutral: str | None = None, neutral_left:
 
 
 def _function(name: str, lifted: bool = False):
-    def write(body: "Body", eqn: Any, *args: Value) -> Value:
+    def write(body: Any, eqn: Any, *args: Value) -> Value:
         kind = wider(*args)
         if lifted:
             args = tuple(lift(a, kind) for a in args)
@@ -57,7 +54,7 @@ def _function(name: str, lifted: bool = False):
 
 
 def _helper(name: str):
-    def write(body: "Body", eqn: Any, *args: Value) -> Value:
+    def write(body: Any, eqn: Any, *args: Value) -> Value:
         body.printer.helpers[name] = HELPERS[name]
         return Value(f"{PREFIX}{name}({', '.join(a.text for a in args)})", wider(*args), reads=reads(*args))
 
@@ -65,7 +62,7 @@ def _helper(name: str):
 
 
 def _comparison(symbol: str, vector_name: str):
-    def write(body: "Body", eqn: Any, a: Value, b: Value) -> Value:
+    def write(body: Any, eqn: Any, a: Value, b: Value) -> Value:
         kind = wider(a, b)
         if not kind[-1].isdigit():
             text = f"{bracketed(a, COMPARISON, False)} {symbol} {bracketed(b, COMPARISON, True)}"
@@ -76,7 +73,7 @@ def _comparison(symbol: str, vector_name: str):
     return write
 
 
-def _select(body: "Body", eqn: Any, which: Value, *cases: Value) -> Value:
+def _select(body: Any, eqn: Any, which: Value, *cases: Value) -> Value:
     if len(cases) != 2:
         raise PrintError("a choice between more than two values")
     kind = wider(*cases)
@@ -89,21 +86,21 @@ def _select(body: "Body", eqn: Any, which: Value, *cases: Value) -> Value:
     return Value(f"mix({no.text}, {yes.text}, {which.text})", kind, reads=reads(which, no, yes))
 
 
-def _passes(body: "Body", eqn: Any, a: Value) -> Value:
+def _passes(body: Any, eqn: Any, a: Value) -> Value:
     return a
 
 
-def _convert(body: "Body", eqn: Any, a: Value) -> Value:
+def _convert(body: Any, eqn: Any, a: Value) -> Value:
     kind = SCALAR_TYPES[np.dtype(eqn.params["new_dtype"]).kind]
     kind = kind if not a.type[-1].isdigit() else f"{VECTOR_TYPES[kind]}{a.type[-1]}"
     return a if kind == a.type else Value(f"{kind}({a.text})", kind, reads=a.reads)
 
 
-def _negate(body: "Body", eqn: Any, a: Value) -> Value:
+def _negate(body: Any, eqn: Any, a: Value) -> Value:
     return Value(f"-{bracketed(a, UNARY, True)}", a.type, UNARY, a.reads)
 
 
-def _slice(body: "Body", eqn: Any, a: Value) -> Value:
+def _slice(body: Any, eqn: Any, a: Value) -> Value:
     start, limit = eqn.params["start_indices"][0], eqn.params["limit_indices"][0]
     if not a.type[-1].isdigit():
         return a
@@ -112,25 +109,25 @@ def _slice(body: "Body", eqn: Any, a: Value) -> Value:
     return Value(f"{bracketed(a, ATOM, False)}.{'xyzw'[start:limit]}", kind, reads=a.reads)
 
 
-def _build(body: "Body", eqn: Any, *parts: Value) -> Value:
+def _build(body: Any, eqn: Any, *parts: Value) -> Value:
     kind = glsl_type(eqn.outvars[0].aval)
     return Value(f"{kind}({', '.join(p.text for p in parts)})", kind, reads=reads(*parts))
 
 
-def _sum(body: "Body", eqn: Any, a: Value) -> Value:
+def _sum(body: Any, eqn: Any, a: Value) -> Value:
     size = eqn.invars[0].aval.shape[0]
     kind = f"vec{size}"
     return Value(f"dot({lift(a, kind).text}, {kind}(1.0))", "float", reads=a.reads)
 
 
-def _dot(body: "Body", eqn: Any, a: Value, b: Value) -> Value:
+def _dot(body: Any, eqn: Any, a: Value, b: Value) -> Value:
     if eqn.params["dimension_numbers"] != (((0,), (0,)), ((), ())):
         raise PrintError("only the dot product of two vectors has a GLSL form")
     kind = glsl_type(eqn.invars[0].aval)
     return Value(f"dot({lift(a, kind).text}, {lift(b, kind).text})", "float", reads=reads(a, b))
 
 
-def _integer_power(body: "Body", eqn: Any, a: Value) -> Value:
+def _integer_power(body: Any, eqn: Any, a: Value) -> Value:
     y = eqn.params.get("y", 2)
     if not re.fullmatch(r"[\w.]+", a.text):
         a = body.local("t", a)
@@ -140,7 +137,7 @@ def _integer_power(body: "Body", eqn: Any, a: Value) -> Value:
     return Value(product, a.type, PRODUCT if y > 1 else ATOM, a.reads)
 
 
-def _clamp(body: "Body", eqn: Any, low: Value, x: Value, high: Value) -> Value:
+def _clamp(body: Any, eqn: Any, low: Value, x: Value, high: Value) -> Value:
     kind = wider(low, x, high)
     low, x, high = (lift(v, kind) for v in (low, x, high))
     return Value(f"clamp({x.text}, {low.text}, {high.text})", kind, reads=reads(low, x, high))
