@@ -26,7 +26,7 @@ lint: dev  ## style and types
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
 pytest: dev  ## the tests, on the source tree; PYTEST_ARGS="-k fresnel" for some of them
-	$(BIN)/pytest --numprocesses auto --dist worksteal $(PYTEST_ARGS)
+	$(BIN)/pytest --numprocesses auto --dist worksteal --durations 10 $(PYTEST_ARGS)
 
 wheel: dev  ## build the wheel and run the tests marked `wheel` on it, away from the source tree
 	rm -rf dist

@@ -14,13 +14,14 @@ import numpy as np
 from ..errors import InputError
 from .exr import Exr
 
-ROLES = ("beauty", "alpha", "normal", "position", "depth", "noise")
+ROLES = ("beauty", "alpha", "normal", "position", "tangent", "depth", "noise")
 """Also the keys of the scene file's [reference] that say where a role is."""
 
 _SUFFIXES = {  # the channels of a layer that make a vector; roles that are not here are one number
     "beauty": ("RGB", "rgb"),
     "normal": ("XYZ", "RGB", "xyz", "rgb"),
     "position": ("XYZ", "RGB", "xyz", "rgb"),
+    "tangent": ("XYZ", "RGB", "xyz", "rgb"),
     "noise": ("RGB", "rgb"),
 }
 _SINGLE = "ZTVYARztvyar"
@@ -31,6 +32,7 @@ _NAMES = {
     "alpha": ("A", "alpha"),
     "normal": ("N", "normal", "normals", "sh_normal", "Ns", "Normal"),
     "position": ("P", "position", "worldPositions", "Position", "WP"),
+    "tangent": ("T", "tangent", "Tangent", "dp_du"),
     "depth": ("Z", "depth", "zDepth", "Depth", "T", "Pz"),
     "noise": ("SE",),
 }
@@ -49,6 +51,8 @@ class Channels:
     alpha: np.ndarray | None
     normal: np.ndarray | None
     position: np.ndarray | None
+    tangent: np.ndarray | None
+    """Along which an anisotropic surface is brushed."""
     depth: np.ndarray | None
     noise: np.ndarray | None
     chosen: dict[str, str]
@@ -99,6 +103,7 @@ def resolve(exr: Exr, overrides: Mapping[str, str] | None = None, need: Collecti
         alpha=array("alpha"),
         normal=array("normal"),
         position=array("position"),
+        tangent=array("tangent"),
         depth=array("depth"),
         noise=array("noise"),
         chosen=chosen,

@@ -17,6 +17,9 @@ from .scene import Reference, Scene
 QUADRATURE = 992
 """Directions a pixel for light that is not a point: .3 % rms of the radiance under a studio map with a coat of width .1."""
 
+LEAST_PIXELS = 32
+"""Fewer usable pixels than this are a fault of the scene, not a reference."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Samples:
@@ -127,13 +130,13 @@ def load_reference(reference: Reference, min_cosine: float) -> View:
         lit = np.any((min_cosine < NoL) & np.any(received.weight > 0.0, -1), 1)
         # A pixel that a grazing light reaches and no other holds little but the model's weakest angle.
         dropped[f"lit at a grazing angle or not at all (cosine below {min_cosine:g})"] = int(np.sum(~lit))
-        if flat.size and not lit.any():
+        if flat.size and lit.sum() < LEAST_PIXELS:
             raise InputError(
                 f"{reference.exr}: no light reaches the visible side of the object; check the positions in [[light]]"
             )
         kept.reshape(-1)[flat[~lit]] = False
     index = np.flatnonzero(kept)
-    if index.size < 32:
+    if index.size < LEAST_PIXELS:
         lost = ", ".join(f"{count} {reason}" for reason, count in dropped.items() if count)
         raise InputError(f"{reference.exr}: only {index.size} of {height * width} pixels can be compared ({lost})")
     target = beauty.reshape(-1, 3)[index].astype(float)
@@ -174,7 +177,8 @@ def _surface(reference: Reference, channels: Channels, height: int, width: int) 
     else:
         # Without coverage, a pixel at a silhouette shows in its neighbours: some of them are empty.
         covered = _eroded(covered)
-    return Surface(channels.position.astype(float), normalise(channels.normal.astype(float)), covered), None
+    tangent = None if channels.tangent is None else channels.tangent.astype(float)
+    return Surface(channels.position.astype(float), normalise(channels.normal.astype(float)), covered), tangent
 
 
 def _eroded(mask: np.ndarray) -> np.ndarray:

@@ -140,7 +140,7 @@ def read_scene(path: Path) -> Scene:
     )
 
 
-_CHANNEL_KEYS = ("beauty", "alpha", "normal", "position", "depth", "noise")
+_CHANNEL_KEYS = ("beauty", "alpha", "normal", "position", "tangent", "depth", "noise")
 
 
 def _references(entry: Any, document: Mapping[str, Any], path: Path, where: str) -> list[Reference]:

@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from ..capture.samples import Samples, View
+from ..capture.samples import QUADRATURE, Samples, View
 from ..errors import InputError
 from ..stack import Stack
 from .blocks import Blocks, arrange
@@ -21,8 +21,11 @@ from .weights import inverse_sigma, robust
 PIXELS = 65536
 """Pixels that a fit uses at most, all references together: more of them do not change the answer by what it can be wrong by."""
 
-EVALUATIONS = 500_000
+EVALUATIONS = 250_000
 """BRDF evaluations that a step may take where light is a quadrature: it decides how many pixels are used."""
+
+DIRECTIONS = QUADRATURE // 2
+"""Light samples a pixel of a quadrature: its error is drawn anew for each pixel, so that few hundred of them average it out."""
 
 COARSE_STEPS = 12
 FINE_STEPS = 60
@@ -122,7 +125,7 @@ class _Fit:
         self.trace: list[Row] = []
         self.clock = Clock()
         self.began = time.perf_counter()
-        self.samples = [view.samples(_chosen(view, len(views), seed)) for view in views]
+        self.samples = [view.samples(_chosen(view, len(views), seed), DIRECTIONS, seed) for view in views]
         self.blocks, self.layout = arrange(self.samples, _scales(views, start), seed)
         self.solver = NormalLevenbergMarquardt()
         self._set_bounds()
@@ -275,8 +278,7 @@ def _without_gauge(start: Stack, free: Sequence[str] | None) -> tuple[Sequence[s
 
 def _chosen(view: View, views: int, seed: int) -> np.ndarray:
     """Pixels of a reference that the fit uses: all, or as many as it can afford, at random."""
-    lights = 1 if view.exact else 992
-    most = max(128, min(PIXELS, EVALUATIONS // lights if lights > 1 else PIXELS) // views)
+    most = max(128, (PIXELS if view.exact else EVALUATIONS // DIRECTIONS) // views)
     total = len(view.index)
     if total <= most:
         return np.arange(total)
