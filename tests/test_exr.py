@@ -475,7 +475,7 @@ def test_write_errors_say_where(tmp_path: Path):
         write_exr(tmp_path, channels)
     locked = tmp_path / "locked"
     locked.mkdir(mode=0o555)
-    for folder in (tmp_path, *tmp_path.parents[:2]):  # pytest's folders are closed to others
+    for folder in (tmp_path, *tmp_path.parents[:3]):  # pytest's folders are closed to others, a worker's one deeper
         folder.chmod(0o755)
     with unprivileged(), pytest.raises(InputError, match=r"x\.exr: cannot be written \(.*\); choose another folder"):
         write_exr(locked / "x.exr", channels)

@@ -27,7 +27,7 @@ def lambert(tmp_path):
         cosine = np.maximum(surface.normal @ np.array(SUN.to_light), 0.0)
         hit = np.isfinite(cosine) & surface.covered
         image = np.where(hit, cosine, 0.0) * 0.5
-        data = {c: image for c in "RGB"} | {"A": surface.covered.astype(float)}
+        data = dict.fromkeys("RGB", image) | {"A": surface.covered.astype(float)}
         data |= {f"N.{c}": np.where(hit, surface.normal[..., k], 0.0) for k, c in enumerate("XYZ")}
         data |= {f"P.{c}": np.where(hit, surface.position[..., k], 0.0) for k, c in enumerate("XYZ")}
         data |= {name.replace("_", "."): value for name, value in channels.items()}

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import STACKS
 
+from helpers import STACKS
 from layerfit.capture.scene import Directional, EnvironmentMap, Point, read_scene
 from layerfit.documents import write_text
 from layerfit.errors import InputError
