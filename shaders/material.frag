@@ -6,26 +6,28 @@
 // Define LF_LIBRARY to take the functions without the entry point below.
 
 //@ material
+
 #ifndef LF_LIBRARY
 
 #ifndef LF_LIGHTS
 #define LF_LIGHTS 1
 #endif
 
-in vec3 v_position;
+in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
 in vec3 v_normal;
 //@ if anisotropic
-in vec3 v_tangent;
+in vec3 v_tangent;   // along which alpha_x is measured
 //@ end
 out vec4 color;
 
 uniform vec3 u_eye;
-// A light's direction (w = 0) or position (w = 1), and its irradiance or its intensity per steradian.
-uniform vec4 u_light[LF_LIGHTS];
-uniform vec3 u_light_rgb[LF_LIGHTS];
+uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
+uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
 
 //@ lights
+
 //@ output
+
 void main() {
     vec3 n = normalize(v_normal);
     vec3 v = normalize(u_eye - v_position);

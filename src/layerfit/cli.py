@@ -20,7 +20,6 @@ STARTED = time.perf_counter()
 
 app = typer.Typer(
     name="layerfit",
-    help="Fit layered materials to reference renders and get a verified shader back.",
     no_args_is_help=True,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
@@ -54,9 +53,31 @@ def _plain(error: Exception) -> str:
     return escape(str(error))
 
 
+def _say(text: str) -> None:
+    """A line on standard error, as it is: nothing in it is markup, and the terminal wraps it."""
+    stderr.print(text, markup=False, soft_wrap=True)
+
+
 def _emit(document: Any) -> None:
     json.dump(document, sys.stdout, indent=2, allow_nan=False)
     sys.stdout.write("\n")
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        from . import __version__
+
+        typer.echo(f"layerfit {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Fit layered materials to reference renders and get a verified shader back."""
 
 
 @app.command()
@@ -94,10 +115,8 @@ def _show_fit(outcome: Any, as_json: bool) -> None:
     from .report.text import lines
 
     for line in lines(outcome.document):
-        stderr.print(line, markup=False, soft_wrap=True)
-    stderr.print(
-        f"Results are in {outcome.directory}/: fit.png, report.html, material.frag, preset.json, fit.json", markup=False
-    )
+        _say(line)
+    _say(f"Wrote fit.png, report.html, material.frag, preset.json, fit.json and trace.csv in {outcome.directory}/")
     if as_json:
         _emit(outcome.document)
 
@@ -166,7 +185,7 @@ def evaluate(
         sys.stdout.write(text)
     else:
         write_text(output, text)
-        stderr.print(f"wrote {output}", markup=False)
+        _say(f"Wrote {output}")
 
 
 @app.command()
@@ -194,7 +213,7 @@ def export(
         sys.stdout.write(text)
     else:
         write_text(output, text)
-        stderr.print(f"wrote {output}", markup=False)
+        _say(f"Wrote {output}")
 
 
 @app.command()
@@ -215,21 +234,19 @@ def verify(
     use_compilation_cache()
     from .job import verify_preset
     from .preset import read_preset
+    from .report.text import verdict, worst
 
     document, picture = verify_preset(read_preset(preset), preset.stem, scene, output, fail, hardfail)
-    parity, worst = document["parity"], document["parity"]["worst"]
-    stderr.print(f"{document['renderer']}", markup=False)
-    stderr.print(f"shader against JAX: max {parity['max_rel']:.2e}, p99.9 {parity['p999_rel']:.2e} relative", markup=False)
-    stderr.print(f"worst value: {worst}", markup=False)
-    if document["image"]:
-        image = document["image"]
-        stderr.print(
-            f"shader against reference: PSNR {image['psnr_db']:.1f} dB, SSIM {image['ssim']:.4f}, delta E 2000 {image['delta_e']:.2f}",
-            markup=False,
-        )
+    parity = document["parity"]
+    _say(f"Drawn by {document['renderer']}")
+    _say(f"shader against JAX: max {parity['max_rel']:.2e}, p99.9 {parity['p999_rel']:.2e} relative, {parity['values']} values")
+    _say(f"worst value: {worst(parity['worst'])}")
+    if image := document["image"]:
+        measures = f"PSNR {image['psnr_db']:.1f} dB, SSIM {image['ssim']:.4f}, delta E 2000 {image['delta_e']:.2f}"
+        _say(f"shader against reference: {measures}")
     if picture:
-        stderr.print(f"Picture: {picture}", markup=False)
-    stderr.print("PASS" if document["passed"] else "FAILURE", markup=False)
+        _say(f"Wrote {picture}")
+    _say(verdict(document))
     if as_json:
         _emit(document)
     raise typer.Exit(0 if document["passed"] else 1)
@@ -258,7 +275,10 @@ def inspect(
 def demo(
     output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out/demo"),
 ) -> None:
-    """Fit the references that layerfit ships, verify their shaders, and say where the pictures are."""
+    """Fit the references that layerfit ships, verify their shaders, and say where the pictures are.
+
+    Example: `layerfit demo -o out/demo`
+    """
     from .cache import use_compilation_cache
 
     use_compilation_cache()

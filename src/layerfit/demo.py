@@ -5,7 +5,7 @@ from typing import Any
 
 from ._data import references
 from .job import Outcome, fit_scene
-from .report.text import number
+from .report.text import measured
 
 
 def run(directory: Path, console: Any) -> bool:
@@ -29,7 +29,7 @@ def run(directory: Path, console: Any) -> bool:
 
 
 def _summary(document: dict[str, Any]) -> list[str]:
-    rows = [f"{name} = {number(row['value'])} +/- {number(row['sigma'])}" for name, row in document["parameters"].items()]
+    rows = [f"{name} = {' +/- '.join(measured(row['value'], row['sigma']))}" for name, row in document["parameters"].items()]
     error, parity = document["error"], document["parity"]
     return [
         ", ".join(rows),

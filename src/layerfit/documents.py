@@ -82,11 +82,17 @@ def _umask() -> int:
     return mask
 
 
-def ensure_directory(path: Path) -> None:
-    """Make a directory for results, or say at once why it cannot be written to."""
+def check_directory(path: Path) -> None:
+    """Say before the work, not after it, why results cannot be written to a directory. Makes nothing: `write_bytes` does."""
+    there = path
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    advice = "Choose another output directory with -o."
+    if not there.is_dir():
+        what = "is a file, not a directory" if there == path else f"cannot be made: {there} is a file"
+        raise InputError(f"{path}: {what}. {advice}")
     try:
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path):
+        with tempfile.NamedTemporaryFile(dir=there):
             pass
     except OSError as error:
-        raise InputError(f"{path}: cannot be written to: {error.strerror}. Choose another output directory with -o.") from None
+        raise InputError(f"{path}: cannot be written to: {error.strerror}. {advice}") from None

@@ -15,23 +15,28 @@ import numpy as np
 from .capture.exr import write_exr
 from .capture.samples import QUADRATURE, Samples, View, load
 from .capture.scene import read_scene
-from .documents import ensure_directory, write_bytes, write_text
+from .documents import check_directory, write_bytes, write_text
 from .errors import InputError
 from .fit.fit import FitResult, fit
 from .fit.metrics import exposure, image_error
 from .fit.residuals import scaled
 from .fit.result import to_json
-from .preset import preset_of
+from .fit.weights import FLOOR_SHARE, MODEL_SHARE
+from .preset import model_name, preset_of
 from .render import radiance
 from .report import html, pictures
-from .shader.export import Shader, print_material
-from .shader.verify import MAX_REL, P999_REL, Parity, check_image, check_pairs, shade_samples
+from .shader.export import print_material
+from .shader.gl import renderer
+from .shader.verify import MAX_REL, P999_REL, Parity, check_image, check_pairs, shade_samples, together
 from .stack import Stack
 
 Progress = Callable[[str, float], None]
 
 PICTURE_SAMPLES = 40_000_000
 """Light samples in one picture at most, where light is a quadrature."""
+
+QUADRATURE_PIXELS = 128
+"""Pixels on which the error of a quadrature is measured: enough to say how large it is."""
 
 
 @dataclasses.dataclass
@@ -53,10 +58,11 @@ def fit_scene(
     `options` override the scene's [fit] table. Raises `LayerfitError` for input or a machine that is at fault.
     """
     began = time.perf_counter()
-    ensure_directory(directory)
     scene = read_scene(path)
     request = dataclasses.replace(scene.fit, **{k: v for k, v in options.items() if v is not None})
     views = load(scene)
+    check_directory(directory)
+    renderer()  # a machine that cannot verify is told so before the fit, not after it
     read_s = time.perf_counter() - began
     progress("fit", 0.0)
     result = fit(
@@ -72,89 +78,145 @@ def fit_scene(
         progress=progress,
     )
     progress("shader", 0.0)
-    after_fit = time.perf_counter()
+    fitted = time.perf_counter()
     name = path.stem
     shader = print_material(result.stack, name)
-    parity, rows, errors = _verify(shader, result)
-    pairs = check_pairs(shader)
-    verify_s = time.perf_counter() - after_fit
-    parity_document = {"max_rel": max(parity.max_rel, pairs.max_rel), "p999_rel": max(parity.p999_rel, pairs.p999_rel)}
+    drawings = draw_all(result.views, load(scene, 0.0), result.stack, name)
+    parity = together([*(drawing.parity for drawing in drawings), check_pairs(shader)])
+    verified = time.perf_counter()
+    picture = pictures.strip([drawing.row() for drawing in drawings])
+    convergence = pictures.convergence([(row.time_s, row.stage, row.start, row.error) for row in result.trace])
+    errors = mean_error(drawings)
+    quadrature = _quadrature(result)
+    now = time.perf_counter()
     seconds = {
-        "total_s": 0.0,
+        "total_s": import_s + now - began,
         "import_s": import_s,
         "read_s": read_s,
         "trace_s": result.clock.trace_s,
         "compile_s": result.clock.compile_s,
         "solve_s": result.solve_s,
-        "verify_s": verify_s,
+        "verify_s": verified - fitted,
+        "pictures_s": now - verified,
     }
-    picture = pictures.strip(rows)
-    convergence = pictures.convergence([(row.time_s, row.stage, row.error) for row in result.trace])
-    seconds["total_s"] = import_s + time.perf_counter() - began
+    parity_document = parity.to_json() | {"passed": parity.passed, "renderer": parity.renderer}
     document = to_json(result, errors, parity_document, seconds, "preset.json")
+    document["flags"] += [] if parity.passed else ["shader_differs"]
+    document["model"] = _model(result.stack)
+    document["pixels"]["usable"] = sum(len(view.index) for view in result.views)
+    document["weighting"] = {
+        "kind": request.weights,
+        "loss": request.loss,
+        "model_share": MODEL_SHARE,
+        "floor_share": FLOOR_SHARE,
+        "noise": [view.noise is not None for view in result.views],
+    }
+    document["quadrature"] = quadrature
     write_text(directory / "material.frag", shader.text())
     write_text(directory / "trace.csv", _trace(result))
     write_bytes(directory / "fit.png", picture)
     write_text(directory / "preset.json", json.dumps(preset_of(result.stack, name, fit=_summary(document)), indent=2) + "\n")
     write_text(directory / "report.html", html.page(name, document, picture, convergence, shader.text()))
     write_text(directory / "fit.json", json.dumps(document, indent=2) + "\n")
-    return Outcome(document, directory, result.converged and parity.passed and pairs.passed)
+    return Outcome(document, directory, result.converged and parity.passed)
 
 
-def _verify(shader: Shader, result: FitResult) -> tuple[Parity, list[list[pictures.Panel]], dict[str, float]]:
-    """The shader's pixels against JAX and against the references: worst parity, picture rows, mean image errors."""
-    parities, rows, errors = [], [], []
-    for view in result.views:
-        drawing = draw(view, scaled(result.stack, view.scales(result.stack)), shader.name)
-        parities.append(drawing.parity)
-        rows.append(drawing.row())
-        errors.append(drawing.error())
-    worst = max(parities, key=lambda p: p.max_rel)
-    return worst, rows, {key: float(np.mean([e[key] for e in errors])) for key in errors[0]}
+def _model(stack: Stack) -> dict[str, Any]:
+    """Which form of the model was fitted, and to what."""
+    return {
+        "name": model_name(stack),
+        "options": preset_of(stack, "").get("options", {}),
+        "layers": " over ".join(type(layer).__name__ for layer in (*stack.layers, stack.base)),
+    }
+
+
+def _quadrature(result: FitResult) -> dict[str, Any] | None:
+    """What sampling the lights costs in accuracy; None where every light is exact."""
+    sampled = [(view, s) for view, s in zip(result.views, result.samples, strict=True) if not view.exact]
+    if not sampled:
+        return None
+    directions = [(_directions(view), s.wi.shape[1]) for view, s in sampled]
+    errors = [
+        [_quadrature_error(result.stack, view, count) for count in counts]
+        for (view, _), counts in zip(sampled, directions, strict=True)
+    ]
+    rms, fit_rms = np.max(errors, 0)
+    picture, fitted = np.min(directions, 0)
+    return {"directions": int(picture), "rms": float(rms), "fit_directions": int(fitted), "fit_rms": float(fit_rms)}
+
+
+def _quadrature_error(stack: Stack, view: View, directions: int) -> float:
+    """Error of one pixel's quadrature over the pixels' rms value: two draws, compared."""
+    rng = np.random.default_rng(0)
+    which = rng.choice(len(view.index), min(QUADRATURE_PIXELS, len(view.index)), replace=False)
+    thick = scaled(stack, view.scales(stack))
+    one, two = (predict(thick, view.samples(which, directions, seed)).astype(float) for seed in (1, 2))
+    return float(np.sqrt(np.mean((one - two) ** 2) / 2.0 / np.maximum(np.mean(one * two), 1e-30)))
 
 
 @dataclasses.dataclass(frozen=True)
 class Drawing:
-    """A material at all usable pixels of a reference, from JAX and from its shader."""
+    """A material where a reference was seen, from JAX and from its shader."""
 
-    view: View
+    compared: View
+    """The pixels on which errors are taken."""
+    drawn: View
+    """All that can be drawn, grazing ones too."""
     model: np.ndarray
     shader: np.ndarray
     parity: Parity
 
     def row(self) -> list[pictures.Panel]:
         """Reference, fit (JAX), shader (OpenGL), and difference of the shader from the reference."""
-        view = self.view
-        white = exposure(view.image(view.target), view.covered)
-        panels = [
-            pictures.shown(f"reference {view.reference.exr.name}", view.picture, white),
-            pictures.shown("fit (JAX)", view.image(self.model), white),
-            pictures.shown("shader (OpenGL)", view.image(self.shader), white),
+        covered = self.compared.covered
+        target = self.compared.image(self.compared.target)
+        white = exposure(target, covered)
+        image = self.drawn.image(self.shader)
+        return [
+            pictures.shown(f"reference {self.compared.reference.exr.stem}", self.compared.picture, white),
+            pictures.shown("fit (JAX)", self.drawn.image(self.model), white),
+            pictures.shown("shader (OpenGL)", image, white),
+            pictures.difference(image, target, white, covered),
         ]
-        return pictures.compare(panels, view.image(self.shader), view.image(view.target), white, view.covered)
 
     def error(self) -> dict[str, float]:
         """Image errors of the shader against the reference."""
-        return image_error(self.view.image(self.shader), self.view.image(self.view.target), self.view.covered)
+        target = self.compared.image(self.compared.target)
+        return image_error(self.drawn.image(self.shader), target, self.compared.covered)
 
 
-def draw(view: View, stack: Stack, name: str) -> Drawing:
-    """Draw a material where a reference was seen, by JAX and by its shader in OpenGL."""
+def draw_all(compared: Sequence[View], drawn: Sequence[View], stack: Stack, name: str) -> list[Drawing]:
+    """Draw a material where references were seen, by JAX and by its shader in OpenGL."""
+    return [draw(view, whole, scaled(stack, view.scales(stack)), name) for view, whole in zip(compared, drawn, strict=True)]
+
+
+def draw(compared: View, drawn: View, stack: Stack, name: str) -> Drawing:
+    """Draw a material where a reference was seen."""
     shader = print_material(stack, name)
     models, images = [], []
-    for samples in _portions(view):
+    for samples in _portions(drawn):
         models.append(predict(stack, samples))
         images.append(shade_samples(shader, samples.wi, samples.wo, samples.weight))
     model, image = np.concatenate(models), np.concatenate(images)
-    return Drawing(view, model, image, check_image(image, model, view.index, view.shape[1]))
+    return Drawing(compared, drawn, model, image, check_image(image, model, drawn.index, drawn.shape[1]))
+
+
+def mean_error(drawings: Sequence[Drawing]) -> dict[str, float]:
+    """Image errors, averaged over the references."""
+    errors = [drawing.error() for drawing in drawings]
+    return {key: float(np.mean([e[key] for e in errors])) for key in errors[0]}
+
+
+def _directions(view: View) -> int:
+    """Light samples of a pixel of a picture, for each light that is a quadrature."""
+    return 1 if view.exact else int(np.clip(PICTURE_SAMPLES // len(view.index), 64, QUADRATURE))
 
 
 def _portions(view: View) -> Iterator[Samples]:
     """All usable pixels, a bounded number of light samples at a time."""
-    directions = 1 if view.exact else int(np.clip(PICTURE_SAMPLES // len(view.index), 64, QUADRATURE))
-    size = max(1, 2_000_000 // directions)
+    size = max(1, 2_000_000 // _directions(view))
     for start in range(0, len(view.index), size):
-        yield view.samples(np.arange(start, min(start + size, len(view.index))), directions)
+        yield view.samples(np.arange(start, min(start + size, len(view.index))), _directions(view))
 
 
 _radiance = jax.jit(radiance)
@@ -184,20 +246,26 @@ def _summary(document: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+PICTURES = (".exr", ".png")
+"""What a render is written as: linear, and for looking at."""
+
+
 def write_render(stack: Stack, views: Sequence[View], output: Path) -> list[Path]:
     """Render a material in place of the references; one file a reference, numbered where there are several."""
+    if output.suffix not in PICTURES:
+        raise InputError(f"{output}: a picture is written as .exr (linear) or .png; choose one of them with -o")
+    check_directory(output.parent)
     written = []
     for k, view in enumerate(views):
         path = output if len(views) == 1 else output.with_stem(f"{output.stem}_{k + 1}")
         thick = scaled(stack, view.scales(stack))
         image = view.image(np.concatenate([predict(thick, samples) for samples in _portions(view)]))
         if path.suffix == ".exr":
+            path.parent.mkdir(parents=True, exist_ok=True)
             channels = {channel: image[..., c] for c, channel in enumerate("RGB")} | {"A": view.covered.astype(np.float32)}
             write_exr(path, channels)
-        elif path.suffix == ".png":
-            write_bytes(path, pictures.plain(image, exposure(image, view.covered)))
         else:
-            raise InputError(f"{path}: a picture is written as .exr (linear) or .png")
+            write_bytes(path, pictures.plain(image, exposure(image, view.covered)))
         written.append(path)
     return written
 
@@ -206,25 +274,25 @@ def verify_preset(
     stack: Stack, name: str, scene: Path | None, output: Path | None, fail: float | None, hardfail: float | None
 ) -> tuple[dict[str, Any], Path | None]:
     """Verify the shader of a material; returns the document of `layerfit verify --json` and where the picture is."""
-    shader = print_material(stack, name)
-    parities = [check_pairs(shader)]
-    image: dict[str, float] = {}
-    picture = None
+    if output is not None:
+        if scene is None:
+            raise InputError(f"{output}: there is no picture without a scene; name one after the preset, or leave -o out")
+        check_directory(output)
+    parities, drawings = [check_pairs(print_material(stack, name))], []
     if scene is not None:
-        drawings = [draw(view, scaled(stack, view.scales(stack)), name) for view in load(read_scene(scene))]
+        read = read_scene(scene)
+        drawings = draw_all(load(read), load(read, 0.0), stack, name)
         parities += [drawing.parity for drawing in drawings]
-        errors = [drawing.error() for drawing in drawings]
-        image = {key: float(np.mean([e[key] for e in errors])) for key in errors[0]}
-        if output is not None:
-            picture = output / "verify.png"
-            write_bytes(picture, pictures.strip([drawing.row() for drawing in drawings]))
-    worst = max(parities, key=lambda p: p.max_rel)
-    p999 = max(p.p999_rel for p in parities)
-    passed = worst.max_rel <= (MAX_REL if hardfail is None else hardfail) and p999 <= (P999_REL if fail is None else fail)
+    parity = together(parities)
+    picture = None
+    if drawings and output is not None:
+        picture = output / "verify.png"
+        write_bytes(picture, pictures.strip([drawing.row() for drawing in drawings]))
+    most, usual = MAX_REL if hardfail is None else hardfail, P999_REL if fail is None else fail
     document = {
-        "parity": worst.to_json() | {"p999_rel": p999},
-        "image": image,
-        "passed": passed,
-        "renderer": worst.renderer,
+        "parity": parity.to_json(),
+        "image": mean_error(drawings) if drawings else {},
+        "passed": parity.max_rel <= most and parity.p999_rel <= usual,
+        "renderer": parity.renderer,
     }
     return document, picture

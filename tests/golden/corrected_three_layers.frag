@@ -2,6 +2,7 @@
 // corrected, three layers: Coat over Coat over Conductor.
 // Printed by layerfit 0.1.0 from its corrected form.
 // Left out, because this material does without: coat: anisotropy, primer: anisotropy, base: anisotropy.
+// Indices of refraction are relative to the layer above: its own index divides those in the preset.
 //
 // vec3 lf_brdf(vec3 n, vec3 v, vec3 l) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
 // the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
@@ -318,20 +319,20 @@ vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
     return lf_evaluate(surface * l, surface * v);
 }
+
 #ifndef LF_LIBRARY
 
 #ifndef LF_LIGHTS
 #define LF_LIGHTS 1
 #endif
 
-in vec3 v_position;
+in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
 in vec3 v_normal;
 out vec4 color;
 
 uniform vec3 u_eye;
-// A light's direction (w = 0) or position (w = 1), and its irradiance or its intensity per steradian.
-uniform vec4 u_light[LF_LIGHTS];
-uniform vec3 u_light_rgb[LF_LIGHTS];
+uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
+uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
 
 // Unit direction l to a light and the irradiance on a surface that faces it.
 vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
@@ -340,6 +341,7 @@ vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
     l = away * inversesqrt(distance2);
     return rgb / (light.w > 0.0 ? distance2 : 1.0);
 }
+
 // Linear radiance, or sRGB (IEC 61966-2-1) for a screen when LF_SRGB is defined.
 vec3 lf_output(vec3 radiance) {
 #ifdef LF_SRGB
@@ -349,6 +351,7 @@ vec3 lf_output(vec3 radiance) {
     return radiance;
 #endif
 }
+
 void main() {
     vec3 n = normalize(v_normal);
     vec3 v = normalize(u_eye - v_position);

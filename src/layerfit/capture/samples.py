@@ -95,9 +95,10 @@ class View:
         )
 
 
-def load(scene: Scene) -> list[View]:
-    """Read every reference of a scene. Raises `InputError` for one that cannot be fitted."""
-    return [load_reference(reference, scene.fit.min_cosine) for reference in scene.references]
+def load(scene: Scene, min_cosine: float | None = None) -> list[View]:
+    """Read every reference of a scene, down to its own least cosine or another. Raises `InputError` for one that cannot be fitted."""
+    least = scene.fit.min_cosine if min_cosine is None else min_cosine
+    return [load_reference(reference, least) for reference in scene.references]
 
 
 def load_reference(reference: Reference, min_cosine: float) -> View:

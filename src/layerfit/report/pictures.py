@@ -1,5 +1,6 @@
 """Picture strips: images side by side at one exposure, with a false-colour difference."""
 
+import dataclasses
 import io
 from collections.abc import Sequence
 
@@ -8,16 +9,31 @@ from PIL import Image, ImageDraw, ImageFont
 
 from ..fit.metrics import display
 
-Panel = tuple[str, np.ndarray]
-"""A caption and an sRGB image (H, W, 3) in [0, 1]."""
+
+@dataclasses.dataclass(frozen=True)
+class Panel:
+    """One picture of a strip."""
+
+    caption: str
+    image: np.ndarray
+    """sRGB, (H, W, 3) in [0, 1]."""
+    scale: str = ""
+    """What the bright end of the false colours stands for; empty for a picture in its own colours."""
+
+
+_Font = ImageFont.FreeTypeFont | ImageFont.ImageFont  # the second where Pillow comes without FreeType
 
 _RAMP = (
     np.array([[0, 0, 4], [51, 13, 96], [120, 28, 109], [187, 55, 84], [237, 105, 37], [252, 180, 25], [252, 255, 164]]) / 255.0
 )
 """Dark to bright through violet and orange: even in lightness, and readable without colour vision."""
 
-_BACKGROUND, _INK = (24, 24, 27), (228, 228, 231)
-_GAP, _CAPTION = 8, 22
+_BACKGROUND, _INK, _LINE = (24, 24, 27), (228, 228, 231), (63, 63, 70)
+_NOT_COMPARED = 0.3
+"""Grey of pixels that a difference leaves out: no colour of the ramp."""
+_SIDE = 256
+"""Small images are enlarged to about this many pixels, by a whole factor; larger ones than twice as many are shrunk."""
+_GAP, _LINE_HEIGHT = 8, 22
 
 
 def false_colour(values: np.ndarray) -> np.ndarray:
@@ -28,74 +44,130 @@ def false_colour(values: np.ndarray) -> np.ndarray:
     return _RAMP[low] * (1.0 - t) + _RAMP[low + 1] * t
 
 
-def difference(image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray) -> tuple[np.ndarray, float]:
-    """Absolute difference in false colour, and the part of white at the end of its scale."""
+def difference(image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray) -> Panel:
+    """Absolute difference of two linear images in false colour; its scale ends at the 99th percentile."""
     error = np.where(covered, np.nan_to_num(np.mean(np.abs(image - reference), -1)), 0.0) / white
     top = max(float(np.quantile(error[covered], 0.99)), 1e-6)
-    return np.where(covered[..., None], false_colour(error / top), 0.05), top
-
-
-def compare(
-    panels: Sequence[Panel], image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray
-) -> list[Panel]:
-    """The panels with a difference of two linear images after them."""
-    picture, top = difference(image, reference, white, covered)
-    return [*panels, (f"difference, 0 to {100.0 * top:.2g} % of white", picture)]
+    picture = np.where(covered[..., None], false_colour(error / top), _NOT_COMPARED)
+    return Panel("difference", picture, f"{100.0 * top:.2g} % of white")
 
 
 def shown(caption: str, image: np.ndarray, white: float) -> Panel:
     """A linear image as a panel."""
-    return caption, display(image, white)
+    return Panel(caption, display(image, white))
 
 
 def strip(rows: Sequence[Sequence[Panel]]) -> bytes:
-    """Rows of panels as one PNG; small images are enlarged, pixel by pixel, to be seen."""
-    height, width = rows[0][0][1].shape[:2]
-    scale = max(1, round(256 / max(height, width)))
-    height, width = height * scale, width * scale
+    """Rows of panels as one PNG, with the scale of their false colours below."""
+    height, width = rows[0][0].image.shape[:2]
+    longest = max(height, width)
+    factor = max(1.0, round(_SIDE / longest)) if longest <= 2 * _SIDE else 2 * _SIDE / longest
+    height, width = round(height * factor), round(width * factor)
     columns = max(len(row) for row in rows)
-    canvas = Image.new("RGB", (columns * (width + _GAP) + _GAP, len(rows) * (height + _GAP + _CAPTION) + _GAP), _BACKGROUND)
+    row_height = height + _GAP + 2 * _LINE_HEIGHT
+    canvas = Image.new("RGB", (columns * (width + _GAP) + _GAP, len(rows) * row_height + _GAP), _BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     font = ImageFont.load_default(13)
     for r, row in enumerate(rows):
-        for c, (caption, image) in enumerate(row):
-            x, y = _GAP + c * (width + _GAP), _GAP + r * (height + _GAP + _CAPTION)
-            picture = Image.fromarray((np.clip(image, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8))
-            canvas.paste(picture.resize((width, height), Image.Resampling.NEAREST), (x, y + _CAPTION))
-            draw.text((x, y + 2), caption, fill=_INK, font=font)
-    out = io.BytesIO()
-    canvas.save(out, "PNG", optimize=True)
-    return out.getvalue()
+        for c, panel in enumerate(row):
+            x, y = _GAP + c * (width + _GAP), _GAP + r * row_height
+            draw.text((x, y + 2), _fitting(draw, panel.caption, width, font), fill=_INK, font=font)
+            picture = _fitted(panel.image, width, height)
+            canvas.paste(picture, (x, y + _LINE_HEIGHT))
+            if panel.scale:
+                _draw_scale(canvas, draw, (x, y + _LINE_HEIGHT + height + 5), width, panel.scale, font)
+    return _png(canvas)
 
 
-def convergence(rows: Sequence[tuple[float, str, float]]) -> bytes:
-    """Error against time of a fit's steps, (seconds, stage, error), the error on a log scale, as a PNG."""
-    width, height, left, low, top = 640, 220, 64, 28, 12
+def _fitted(image: np.ndarray, width: int, height: int) -> Image.Image:
+    """An image in a box, as large as it can be without changing its shape."""
+    picture = Image.fromarray((np.clip(image, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8))
+    factor = min(width / picture.width, height / picture.height)
+    how = Image.Resampling.NEAREST if factor >= 1.0 else Image.Resampling.LANCZOS
+    return picture.resize((max(1, round(picture.width * factor)), max(1, round(picture.height * factor))), how)
+
+
+def _fitting(draw: ImageDraw.ImageDraw, text: str, width: int, font: _Font) -> str:
+    """As much of a caption as there is room for."""
+    if draw.textlength(text, font=font) <= width:
+        return text
+    while text and draw.textlength(f"{text}...", font=font) > width:
+        text = text[:-1]
+    return f"{text}..."
+
+
+def _draw_scale(canvas: Image.Image, draw: ImageDraw.ImageDraw, at: tuple[int, int], width: int, end: str, font: _Font) -> None:
+    """The false colours from 0 to their end, in a line, and the grey of what was not compared."""
+    x, y = at
+    bar = max(24, width // 3 - 20)
+    colours = np.repeat(false_colour(np.linspace(0.0, 1.0, bar))[None], 10, 0)
+    draw.text((x, y - 3), "0", fill=_INK, font=font)
+    canvas.paste(Image.fromarray((colours * 255.0 + 0.5).astype(np.uint8)), (x + 12, y))
+    draw.text((x + bar + 18, y - 3), end, fill=_INK, font=font)
+    text, grey = "left out", round(255 * _NOT_COMPARED)
+    left = x + width - draw.textlength(text, font=font)
+    if left - 16 > x + bar + 24 + draw.textlength(end, font=font):
+        draw.rectangle((left - 15, y, left - 6, y + 9), fill=(grey, grey, grey))
+        draw.text((left, y - 3), text, fill=_INK, font=font)
+
+
+def convergence(rows: Sequence[tuple[float, str, int, float]]) -> bytes:
+    """Error of a fit against its run time, a dot a step of (seconds, stage, start, error), as a PNG: one line a start."""
+    width, height, left, right, low, top = 760, 300, 64, 16, 44, 34
     canvas = Image.new("RGB", (width, height), _BACKGROUND)
     draw = ImageDraw.Draw(canvas)
-    font = ImageFont.load_default(12)
-    time = np.array([row[0] for row in rows])
-    cost = np.log10(np.maximum([row[2] for row in rows], 1e-30))
-    stages = list(dict.fromkeys(row[1].split()[0] for row in rows))
-    floor, ceiling = np.floor(cost.min()), np.ceil(cost.max() + 1e-9)
-    to_x = lambda t: left + (t - time[0]) / max(time[-1] - time[0], 1e-9) * (width - left - 12)  # noqa: E731
-    to_y = lambda c: top + (ceiling - c) / max(ceiling - floor, 1.0) * (height - top - low)  # noqa: E731
+    font = ImageFont.load_default(13)
+    error = np.log10(np.maximum([row[3] for row in rows], 1e-30))
+    floor, ceiling = np.floor(error.min()), np.ceil(error.max() + 1e-9)
+    end = max(rows[-1][0], 1e-9)
+    to_x = lambda t: left + t / end * (width - left - right)  # noqa: E731
+    to_y = lambda e: top + (ceiling - e) / (ceiling - floor) * (height - top - low)  # noqa: E731
     for decade in np.arange(floor, ceiling + 1, max(1.0, np.ceil((ceiling - floor) / 6))):
-        draw.line([(left, to_y(decade)), (width - 12, to_y(decade))], fill=(63, 63, 70))
-        draw.text((8, to_y(decade) - 7), f"1e{decade:.0f}", fill=_INK, font=font)
-    for (t, stage, _), c in zip(rows, cost, strict=True):
-        i = stages.index(stage.split()[0])
-        colour = tuple(int(v * 255) for v in false_colour(np.array([[0.35 + 0.6 * i / max(len(stages) - 1, 1)]]))[0, 0])
-        y = to_y(c)
-        draw.ellipse([to_x(t) - 2, y - 2, to_x(t) + 2, y + 2], fill=colour)
-    draw.text((left, height - 20), f"{', '.join(stages)}; {time[-1] - time[0]:.2f} s from left to right", fill=_INK, font=font)
-    out = io.BytesIO()
-    canvas.save(out, "PNG", optimize=True)
-    return out.getvalue()
+        draw.line([(left, to_y(decade)), (width - right, to_y(decade))], fill=_LINE)
+        draw.text(
+            (10, to_y(decade) - 8), f"{10.0**decade:.0e}" if abs(decade) > 3 else f"{10.0**decade:g}", fill=_INK, font=font
+        )
+    for second in _ticks(end):
+        draw.line([(to_x(second), height - low), (to_x(second), height - low + 5)], fill=_INK)
+        draw.text((to_x(second) - 6, height - low + 8), f"{second:g}", fill=_INK, font=font)
+    draw.text((width / 2 - 70, height - 18), "seconds since the fit began", fill=_INK, font=font)
+    stages = list(dict.fromkeys(row[1].split()[0] for row in rows))
+    colours = {s: _stage_colour(i / max(len(stages) - 1, 1)) for i, s in enumerate(stages)}
+    before: tuple[str, int] | None = None
+    for k, (t, stage, start, _) in enumerate(rows):
+        colour, point = colours[stage.split()[0]], (to_x(t), to_y(error[k]))
+        if (stage, start) == before:
+            draw.line([(to_x(rows[k - 1][0]), to_y(error[k - 1])), point], fill=colour)
+        draw.ellipse([point[0] - 2, point[1] - 2, point[0] + 2, point[1] + 2], fill=colour)
+        before = stage, start
+    draw.text((10, 8), "error of the pixels in use, relative:", fill=_INK, font=font)
+    x = 10 + draw.textlength("error of the pixels in use, relative:", font=font) + 16
+    for stage, colour in colours.items():
+        draw.ellipse([x, 13, x + 7, 20], fill=colour)
+        draw.text((x + 12, 8), stage, fill=_INK, font=font)
+        x += 28 + draw.textlength(stage, font=font)
+    return _png(canvas)
+
+
+def _stage_colour(place: float) -> tuple[int, int, int]:
+    r, g, b = (round(255 * float(v)) for v in false_colour(np.array([[0.4 + 0.55 * place]]))[0, 0])
+    return r, g, b
+
+
+def _ticks(end: float) -> np.ndarray:
+    """About six round numbers from 0 to `end`."""
+    raw = end / 6.0
+    power = 10.0 ** np.floor(np.log10(raw))
+    step = next(power * m for m in (1.0, 2.0, 5.0, 10.0) if power * m >= raw)
+    return np.arange(0.0, end * (1.0 + 1e-9), step)
 
 
 def plain(image: np.ndarray, white: float) -> bytes:
     """A linear image as an sRGB PNG."""
+    return _png(Image.fromarray((display(image, white) * 255.0 + 0.5).astype(np.uint8)))
+
+
+def _png(image: Image.Image) -> bytes:
     out = io.BytesIO()
-    Image.fromarray((display(image, white) * 255.0 + 0.5).astype(np.uint8)).save(out, "PNG", optimize=True)
+    image.save(out, "PNG", optimize=True)
     return out.getvalue()

@@ -1,6 +1,7 @@
 """The report of a fit in the terminal: lmfit's blocks, with what an image can and cannot tell beside them."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,32 +10,25 @@ import numpy as np
 def lines(document: Mapping[str, Any]) -> list[str]:
     """The blocks of a `fit.json` document as text."""
     d = document
-    error, seconds = d["error"], d["time"]
+    error, pixels = d["error"], d["pixels"]
     out = ["[[Fit]]"]
     out += _rows(
         {
-            "converged": "yes" if d["converged"] else "NO",
+            "model": f"{d['model']['layers']}, {d['model']['name']} form{_options(d['model']['options'])}",
+            "converged": f"{'yes' if d['converged'] else 'NO'}, after {d['steps']} steps",
             "flags": ", ".join(d["flags"]) or "none",
             "error": f"{error['rel_l2']:.3g} relative L2, PSNR {error['psnr_db']:.1f} dB, SSIM {error['ssim']:.4f}, "
             f"delta E 2000 {error['delta_e']:.2f}",
-            "pixels": f"{d['pixels']['used']} used{_dropped(d['pixels']['dropped'])}",
+            "pixels": f"{_pixels(pixels)}{_dropped(pixels['dropped'])}",
+            "weights": _weights(d["weighting"]),
+            "light": _light(d["quadrature"]),
             "starts": f"{d['starts']}, of which {_same_minimum(d['minima'])} reached this minimum",
         }
     )
-    out += ["[[Parameters]]"]
-    for name, row in d["parameters"].items():
-        notes = []
-        if row.get("at_bound"):
-            notes.append(f"at its {row['at_bound']} bound")
-        if row.get("identifiable") is False:
-            notes.append("not identifiable")
-        if "derived" in row:
-            notes.append(f"= {row['derived']}")
-        start = f"  (start {number(row['start'])})" if "start" in row else ""
-        unit = f" {row['unit']}" if row.get("unit", "1") != "1" else ""
-        out.append(
-            f"    {name + ':':<26} {number(row['value'])} +/- {number(row['sigma'])}{unit}{start}{'  ' * bool(notes)}{', '.join(notes)}"
-        )
+    out += [
+        "[[Parameters]] (sigma: scatter of the residuals and of parts of the image; what the model cannot follow is not in it)"
+    ]
+    out += [_parameter(name, row) for name, row in d["parameters"].items()]
     if d["correlations"]:
         out += ["[[Correlations]] (below 0.5 are not listed)"]
         out += [f"    C({a}, {b}) = {r:+.3f}" for a, b, r in d["correlations"][:12]]
@@ -44,18 +38,45 @@ def lines(document: Mapping[str, Any]) -> list[str]:
         out += [f"    {note}" for note in d["notes"]]
     if d["left_out"]:
         out += ["[[Left out]]", f"    {', '.join(d['left_out'])}"]
-    if d["parity"]:
-        parity = d["parity"]
-        out += ["[[Shader]]", f"    against JAX: max {parity['max_rel']:.1e}, p99.9 {parity['p999_rel']:.1e} relative"]
-    out += ["[[Time]]"]
-    total = seconds["total_s"]
-    shares = ", ".join(f"{key[:-2]} {seconds[key]:.2f} s" for key in seconds if key != "total_s")
-    out.append(f"    {total:.2f} s in all: {shares}; {d['steps']} steps")
-    return out
+    parity = d["parity"]
+    out += [
+        f"[[Shader]] (drawn by {parity['renderer']})",
+        f"    against JAX: max {parity['max_rel']:.1e}, p99.9 {parity['p999_rel']:.1e} relative: {verdict(parity)}",
+        f"    worst value: {worst(parity['worst'])}",
+    ]
+    return [*out, "[[Time]]", f"    {_time(d['time'])}"]
+
+
+def verdict(parity: Mapping[str, Any]) -> str:
+    """Whether the shader is the material, in a word."""
+    return "PASS" if parity["passed"] else "FAILURE"
+
+
+def worst(place: Mapping[str, Any]) -> str:
+    """Where a shader differs most from JAX: a pixel, or a pair of directions."""
+    if "x" in place:
+        where = f"pixel x {place['x']}, y {place['y']}"
+    else:
+        where = ", ".join(f"{key} ({', '.join(f'{v:.6f}' for v in place[key])})" for key in ("wi", "wo"))
+    return f"{place['channel']} at {where}: shader {place['shader']:.8g}, JAX {place['jax']:.8g}"
 
 
 def _rows(rows: Mapping[str, str]) -> list[str]:
     return [f"    {key + ':':<12} {value}" for key, value in rows.items()]
+
+
+def _parameter(name: str, row: Mapping[str, Any]) -> str:
+    value, sigma = measured(row["value"], row["sigma"])
+    unit = f" {row['unit']}" if row.get("unit", "1") != "1" else ""
+    notes = [f"start {number(row['start'])}"] if "start" in row else []
+    return f"    {name + ':':<26} {value} +/- {sigma}{unit}  ({', '.join([*notes, *states(row)])})"
+
+
+def states(row: Mapping[str, Any]) -> list[str]:
+    """What a reader should know of a parameter."""
+    found = [f"at its {row['at_bound']} bound"] if row.get("at_bound") else []
+    found += ["not identifiable"] if row.get("identifiable") is False else []
+    return found + ([f"= {row['derived']}"] if "derived" in row else [])
 
 
 def number(value: Any) -> str:
@@ -67,7 +88,55 @@ def number(value: Any) -> str:
     return f"{value:.4g}"
 
 
-def _dropped(dropped: list[Mapping[str, int]]) -> str:
+def measured(value: Any, sigma: Any) -> tuple[str, str]:
+    """A value with the digits that its sigma leaves it, seven at most, and the sigma in two."""
+    if isinstance(value, list):
+        pairs = [measured(v, s) for v, s in zip(value, sigma if isinstance(sigma, list) else [sigma] * len(value), strict=True)]
+        values, sigmas = ("[" + ", ".join(column) + "]" for column in zip(*pairs, strict=True))
+        return values, sigmas
+    if not sigma or not value:
+        return number(value), number(sigma)
+    decimals = min(1 - math.floor(math.log10(sigma)), 6 - math.floor(math.log10(abs(value))))
+    return f"{value:.{max(decimals, 0)}f}", f"{sigma:.2g}"
+
+
+def _options(options: Mapping[str, Any]) -> str:
+    return "".join(f", {key} = {value}" for key, value in options.items())
+
+
+def _pixels(pixels: Mapping[str, Any]) -> str:
+    used, usable = pixels["used"], pixels["usable"]
+    return f"{used} used" if used == usable else f"{used} used, drawn at random from {usable} that can be compared"
+
+
+def _weights(weighting: Mapping[str, Any]) -> str:
+    loss = "" if weighting["loss"] == "square" else f"; {weighting['loss']} loss"
+    if weighting["kind"] == "uniform":
+        return f"the same for every pixel{loss}"
+    noise = weighting["noise"]
+    known = "the noise that the file states" if all(noise) else "the noise of the files that state it"
+    of_model, of_white = 100.0 * weighting["model_share"], 100.0 * weighting["floor_share"]
+    misfit = f"{of_model:g} % of the value, {of_white:g} % of the image's brightness"
+    misfit += f" and {known}" if any(noise) else "; no file states its noise"
+    return f"1 / (expected misfit)^2, from {misfit}{loss}"
+
+
+def _light(quadrature: Mapping[str, Any] | None) -> str:
+    if quadrature is None:
+        return "exact: distant and point lights only"
+    return (
+        f"quadrature: pictures {quadrature['directions']} directions a pixel, {100.0 * quadrature['rms']:.2g} % rms error of a pixel; "
+        f"the fit {quadrature['fit_directions']}, {100.0 * quadrature['fit_rms']:.2g} %"
+    )
+
+
+def _time(seconds: Mapping[str, float]) -> str:
+    total = seconds["total_s"]
+    parts = [f"{key[:-2]} {value:.2f} s ({100.0 * value / total:.0f} %)" for key, value in seconds.items() if key != "total_s"]
+    return f"{total:.2f} s in all: {', '.join(parts)}"
+
+
+def _dropped(dropped: Sequence[Mapping[str, int]]) -> str:
     total: dict[str, int] = {}
     for view in dropped:
         for reason, count in view.items():
@@ -75,6 +144,6 @@ def _dropped(dropped: list[Mapping[str, int]]) -> str:
     return "; left out: " + ", ".join(f"{count} {reason}" for reason, count in total.items()) if total else ""
 
 
-def _same_minimum(minima: list[Mapping[str, float]]) -> int:
+def _same_minimum(minima: Sequence[Mapping[str, float]]) -> int:
     costs = np.array([m["cost"] for m in minima])
     return int(np.sum(costs <= costs.min() * 1.02 + 1e-9))

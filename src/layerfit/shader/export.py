@@ -60,6 +60,9 @@ class Shader:
             f"Printed by layerfit {__version__} from its {model_name(self.stack)} form.",
             f"Left out, because this material does without: {', '.join(left_out(self.stack)) or 'nothing'}.",
         ]
+        covered = (*self.stack.layers, self.stack.base)[1:]
+        if not self.uniforms and any(name == "eta" for layer in covered for name, _ in params(layer)):
+            lines += ["Indices of refraction are relative to the layer above: its own index divides those in the preset."]
         return "\n".join(f"// {line}" for line in lines)
 
 

@@ -14,7 +14,7 @@ MARKER = -7.0
 """Alpha of a pixel that nothing was drawn to: an unbound framebuffer or a shader that discards would return zeros and no error."""
 
 _POINT_VERTEX = """\
-#version 330 core
+{version}
 in vec2 a_pixel;
 {inputs}
 {outputs}
@@ -57,6 +57,7 @@ def compile_points(fragment: str, attributes: Mapping[str, int]) -> moderngl.Pro
     """Compile a fragment shader whose inputs come from one point a pixel: `attributes` are input names with their sizes."""
     kinds = {1: "float", 2: "vec2", 3: "vec3", 4: "vec4"}
     vertex = _POINT_VERTEX.format(
+        version=fragment.partition("\n")[0],  # one language for both stages: GLSL ES is drawn through ARB_ES3_compatibility
         inputs="\n".join(f"in {kinds[size]} a_{name};" for name, size in attributes.items()),
         outputs="\n".join(f"out {kinds[size]} {name};" for name, size in attributes.items()),
         copies="".join(f"    {name} = a_{name};\n" for name in attributes),

@@ -1,6 +1,7 @@
 """Is the shader the material? The printed functions rendered in OpenGL, compared with JAX number by number."""
 
 import dataclasses
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -36,6 +37,13 @@ class Parity:
 
     def to_json(self) -> dict[str, Any]:
         return {"max_rel": self.max_rel, "p999_rel": self.p999_rel, "worst": self.worst, "values": self.count}
+
+
+def together(parities: Sequence[Parity]) -> Parity:
+    """The worst of several checks as one."""
+    worst = max(parities, key=lambda p: p.max_rel)
+    p999 = max(p.p999_rel for p in parities)
+    return dataclasses.replace(worst, p999_rel=p999, count=sum(p.count for p in parities))
 
 
 def compare(shader: np.ndarray, model: np.ndarray, floor: float, describe: Any = lambda row: {}) -> Parity:
