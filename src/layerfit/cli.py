@@ -149,7 +149,7 @@ def render(
     scene: Scene,
     output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write: .exr (linear) or .png.")],
 ) -> None:
-    """Render a preset in place of a scene's reference: same camera, lights and pixels.
+    """Render a preset in place of a scene's reference: same camera and lights, wherever the object covers a pixel.
 
     Example: `layerfit render out/preset.json scene.toml -o copper.exr`
     """
@@ -161,7 +161,7 @@ def render(
     from .job import write_render
     from .preset import read_preset
 
-    written = write_render(read_preset(preset), load(read_scene(scene)), output)
+    written = write_render(read_preset(preset), load(read_scene(scene), 0.0), output)
     for path in written:
         typer.echo(str(path))
 

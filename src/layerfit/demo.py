@@ -4,12 +4,14 @@ from pathlib import Path
 from typing import Any
 
 from ._data import references
+from .documents import check_directory
 from .job import Outcome, fit_scene
 from .report.text import measured
 
 
 def run(directory: Path, console: Any) -> bool:
     """Fit all shipped references into `directory`, a folder each; prints a line each and where the pictures are."""
+    check_directory(directory)
     scenes = sorted(references().glob("*.toml"))
     outcomes: list[tuple[str, Outcome]] = []
     for k, scene in enumerate(scenes):

@@ -37,9 +37,9 @@ def read_document(path: Path) -> dict[str, Any]:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """'; did you mean "..."?' where something known is close, else nothing."""
+    """ " (did you mean '...'?)" where something known is close, else nothing."""
     close = difflib.get_close_matches(word, list(known), 1, 0.5)
-    return f"; did you mean {close[0]!r}?" if close else ""
+    return f" (did you mean {close[0]!r}?)" if close else ""
 
 
 def check_keys(document: Any, known: Sequence[str], where: str) -> None:
@@ -65,7 +65,9 @@ def write_bytes(path: Path, content: bytes) -> None:
         os.replace(temporary, path)
     except OSError as error:
         Path(temporary).unlink(missing_ok=True)
-        raise InputError(f"{path}: cannot be written: {error.strerror}. Nothing of it was changed.") from None
+        raise InputError(
+            f"{path}: cannot be written: {error.strerror}. It was left as it was; choose another output path."
+        ) from None
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise

@@ -319,7 +319,8 @@ def _layout(path: Path) -> list[_Layout]:
         raise InputError(f"{str(path)!a}: the name holds bytes that are not UTF-8, or zeros; rename the file") from None
     try:
         if not stat.S_ISREG(os.fstat(fd).st_mode):
-            raise InputError(f"{path}: is not a file; give the name of an EXR file")
+            what = "a directory" if stat.S_ISDIR(os.fstat(fd).st_mode) else "not a file"
+            raise InputError(f"{path}: is {what}; give the name of an EXR file")
         source = _Source(path, fd)
         layouts = _read_headers(source)
         _check_blocks(source, layouts)

@@ -17,6 +17,9 @@ from .scene import Reference, Scene
 QUADRATURE = 992
 """Directions a pixel for light that is not a point: .3 % rms of the radiance under a studio map with a coat of width .1."""
 
+PROBES = 256
+"""Pixels, and directions of each, that are tried before a quadrature is said to receive no light."""
+
 LEAST_PIXELS = 32
 """Fewer usable pixels than this are a fault of the scene, not a reference."""
 
@@ -132,9 +135,7 @@ def load_reference(reference: Reference, min_cosine: float) -> View:
         # A pixel that a grazing light reaches and no other holds little but the model's weakest angle.
         dropped[f"lit at a grazing angle or not at all (cosine below {min_cosine:g})"] = int(np.sum(~lit))
         if flat.size and lit.sum() < LEAST_PIXELS:
-            raise InputError(
-                f"{reference.exr}: no light reaches the visible side of the object; check the positions in [[light]]"
-            )
+            raise InputError(_unlit(reference))
         kept.reshape(-1)[flat[~lit]] = False
     index = np.flatnonzero(kept)
     if index.size < LEAST_PIXELS:
@@ -146,6 +147,10 @@ def load_reference(reference: Reference, min_cosine: float) -> View:
             f"{reference.exr}: the object is black in every usable pixel; check the beauty channels and the lights"
         )
     pick = lambda image: image.reshape(-1, 3)[index]  # noqa: E731
+    some = index[:: max(1, index.size // PROBES)]
+    args = (image.reshape(-1, 3)[some] for image in (surface.position, surface.normal, view))
+    if not np.any(receive(reference.lights, *args, samples=PROBES, seed=0).weight > 0.0):
+        raise InputError(_unlit(reference))
     return View(
         reference=reference,
         target=target,
@@ -159,6 +164,10 @@ def load_reference(reference: Reference, min_cosine: float) -> View:
         dropped={reason: count for reason, count in dropped.items() if count},
         picture=beauty,
     )
+
+
+def _unlit(reference: Reference) -> str:
+    return f"{reference.exr}: no light reaches the visible side of the object; check where the lights in [[light]] are, and how bright"
 
 
 def _surface(reference: Reference, channels: Channels, height: int, width: int) -> tuple[Surface, np.ndarray | None]:
