@@ -12,12 +12,13 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "layerfit"
 
 LADDER = [
-    {"errors", "documents", "_data", "_types", "_chunk", "_fields"},
+    {"errors", "documents", "_data", "_types", "_chunk", "_compiled", "_fields"},
     {"optics"},
     {"surfaces"},
     {"layers"},
     {"forms"},
     {"stack"},
+    {"render"},
     {"materials"},
     {"preset"},
     {"walk"},
@@ -25,7 +26,7 @@ LADDER = [
 """A part imports from its own step and those before it."""
 
 BRANCHES = [
-    [{"capture"}, {"render"}, {"fit"}],
+    [{"capture"}, {"fit"}],
     [
         {"shader.glsl", "shader.helpers", "shader.names"},
         {"shader.primitives"},

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
 from .capture.exr import write_exr
@@ -23,9 +22,9 @@ from .fit.residuals import scaled
 from .fit.result import to_json
 from .fit.weights import FLOOR_SHARE, MODEL_SHARE
 from .preset import model_name, preset_of
-from .render import radiance
+from .render import predict
 from .report import html, pictures
-from .shader.export import print_material
+from .shader.export import Shader, print_material
 from .shader.gl import renderer
 from .shader.verify import MAX_REL, P999_REL, Parity, check_image, check_pairs, shade_samples, together
 from .stack import Stack
@@ -81,7 +80,7 @@ def fit_scene(
     fitted = time.perf_counter()
     name = path.stem
     shader = print_material(result.stack, name)
-    drawings = draw_all(result.views, load(scene, 0.0), result.stack, name)
+    drawings = draw_all(result.views, load(scene, 0.0), shader)
     parity = together([*(drawing.parity for drawing in drawings), check_pairs(shader)])
     verified = time.perf_counter()
     picture = pictures.strip([drawing.row() for drawing in drawings])
@@ -150,7 +149,7 @@ def _quadrature_error(stack: Stack, view: View, directions: int) -> float:
     rng = np.random.default_rng(0)
     which = rng.choice(len(view.index), min(QUADRATURE_PIXELS, len(view.index)), replace=False)
     thick = scaled(stack, view.scales(stack))
-    one, two = (predict(thick, view.samples(which, directions, seed)).astype(float) for seed in (1, 2))
+    one, two = (predict(thick, *view.samples(which, directions, seed).arrays).astype(float) for seed in (1, 2))
     return float(np.sqrt(np.mean((one - two) ** 2) / 2.0 / np.maximum(np.mean(one * two), 1e-30)))
 
 
@@ -185,18 +184,22 @@ class Drawing:
         return image_error(self.drawn.image(self.shader), target, self.compared.covered)
 
 
-def draw_all(compared: Sequence[View], drawn: Sequence[View], stack: Stack, name: str) -> list[Drawing]:
+def draw_all(compared: Sequence[View], drawn: Sequence[View], shader: Shader) -> list[Drawing]:
     """Draw a material where references were seen, by JAX and by its shader in OpenGL."""
-    return [draw(view, whole, scaled(stack, view.scales(stack)), name) for view, whole in zip(compared, drawn, strict=True)]
+    drawings = []
+    for view, whole in zip(compared, drawn, strict=True):
+        scale = view.scales(shader.stack)
+        thick = shader if scale is None else print_material(scaled(shader.stack, scale), shader.name)
+        drawings.append(draw(view, whole, thick))
+    return drawings
 
 
-def draw(compared: View, drawn: View, stack: Stack, name: str) -> Drawing:
+def draw(compared: View, drawn: View, shader: Shader) -> Drawing:
     """Draw a material where a reference was seen."""
-    shader = print_material(stack, name)
     models, images = [], []
     for samples in _portions(drawn):
-        models.append(predict(stack, samples))
-        images.append(shade_samples(shader, samples.wi, samples.wo, samples.weight))
+        models.append(predict(shader.stack, *samples.arrays))
+        images.append(shade_samples(shader, *samples.arrays))
     model, image = np.concatenate(models), np.concatenate(images)
     return Drawing(compared, drawn, model, image, check_image(image, model, drawn.index, drawn.shape[1]))
 
@@ -217,14 +220,6 @@ def _portions(view: View) -> Iterator[Samples]:
     size = max(1, 2_000_000 // _directions(view))
     for start in range(0, len(view.index), size):
         yield view.samples(np.arange(start, min(start + size, len(view.index))), _directions(view))
-
-
-_radiance = jax.jit(radiance)
-
-
-def predict(stack: Stack, samples: Samples) -> np.ndarray:
-    """Radiance (n, 3) of a material at samples, in float32."""
-    return np.asarray(_radiance(stack.astype(np.float32), samples.wi, samples.wo, samples.weight))
 
 
 def _trace(result: FitResult) -> str:
@@ -259,7 +254,7 @@ def write_render(stack: Stack, views: Sequence[View], output: Path) -> list[Path
     for k, view in enumerate(views):
         path = output if len(views) == 1 else output.with_stem(f"{output.stem}_{k + 1}")
         thick = scaled(stack, view.scales(stack))
-        image = view.image(np.concatenate([predict(thick, samples) for samples in _portions(view)]))
+        image = view.image(np.concatenate([predict(thick, *samples.arrays) for samples in _portions(view)]))
         if path.suffix == ".exr":
             path.parent.mkdir(parents=True, exist_ok=True)
             channels = {channel: image[..., c] for c, channel in enumerate("RGB")} | {"A": view.covered.astype(np.float32)}
@@ -278,10 +273,11 @@ def verify_preset(
         if scene is None:
             raise InputError(f"{output}: there is no picture without a scene; name one after the preset, or leave -o out")
         check_directory(output)
-    parities, drawings = [check_pairs(print_material(stack, name))], []
+    shader = print_material(stack, name)
+    parities, drawings = [check_pairs(shader)], []
     if scene is not None:
         read = read_scene(scene)
-        drawings = draw_all(load(read), load(read, 0.0), stack, name)
+        drawings = draw_all(load(read), load(read, 0.0), shader)
         parities += [drawing.parity for drawing in drawings]
     parity = together(parities)
     picture = None

@@ -1,11 +1,14 @@
 """Linear radiance of a material at samples: the sum over light samples of BRDF times weight."""
 
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
+from ._compiled import Compiled
 from .stack import Stack, evaluate
 
 
@@ -13,19 +16,47 @@ def radiance(
     stack: Stack, wi: Float[Array, "n s 3"], wo: Float[Array, "n 3"], weight: Float[Array, "n s 3"]
 ) -> Float[Array, "n 3"]:
     """Radiance of pixels: directions in their surface frames, `weight` what each direction brings per unit of BRDF."""
-    return radiance_prepared(stack.form, stack.prepare(), wi, wo, weight)
+    prepared = _prepare(stack)
+    return jax.vmap(lambda wi, wo, weight: _pixel(stack.form, prepared, wi, wo, weight))(wi, wo, weight)
 
 
-def radiance_prepared(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any) -> Any:
-    """`radiance` of a material whose constants are known."""
+# Units of their own for the tracer: a fit differentiates both once a parameter, from one trace.
+_prepare = jax.jit(Stack.prepare)
 
-    def pixel(wi: Any, wo: Any, weight: Any) -> Any:
-        if wi.shape[0] == 1:
-            return evaluate(form, prepared, wi[0], wo) * weight[0]
-        f = jax.vmap(lambda w: jnp.broadcast_to(evaluate(form, prepared, w, wo), (3,)))(wi)
-        return jnp.sum(f * weight, 0)
 
-    return jax.vmap(pixel)(wi, wo, weight)
+@partial(jax.jit, static_argnames="form")
+def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any) -> Any:
+    if wi.shape[0] == 1:
+        return evaluate(form, prepared, wi[0], wo) * weight[0]
+    f = jax.vmap(lambda w: jnp.broadcast_to(evaluate(form, prepared, w, wo), (3,)))(wi)
+    return jnp.sum(f * weight, 0)
+
+
+_compiled = Compiled(radiance)
+_BLOCK = 4096
+
+
+def block_size(lights: int) -> int:
+    """Pixels, of so many light samples each, that are computed at a time: as many as stay in a processor's cache."""
+    return max(32, 2 ** ((16 * _BLOCK // lights).bit_length() - 1)) if lights > 16 else _BLOCK
+
+
+def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """`radiance` of any number of pixels in float32, block by block: one executable a material and number of light samples."""
+    size = block_size(wi.shape[1])
+    stack = stack.astype(np.float32)
+    rows = []
+    with jax.enable_x64(False):
+        for start in range(0, len(wo), size):
+            block = [_padded(a[start : start + size], size) for a in (wi, wo, weight)]
+            rows.append(np.asarray(_compiled(stack, *block)))
+    return np.concatenate(rows)[: len(wo)]
+
+
+def _padded(a: np.ndarray, size: int) -> np.ndarray:
+    """Rows of float32, the last one repeated where there are too few."""
+    a = a.astype(np.float32, copy=False)
+    return a if len(a) == size else np.concatenate([a, np.repeat(a[-1:], size - len(a), 0)])
 
 
 def brdf(stack: Stack, wi: Float[Array, "n 3"], wo: Float[Array, "n 3"]) -> Float[Array, "n 3"]:

@@ -41,6 +41,11 @@ class Samples:
     """Row-major place of each pixel in the image."""
     shape: tuple[int, int]
 
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """wi, wo and weight: what a material is evaluated at."""
+        return self.wi, self.wo, self.weight
+
 
 @dataclasses.dataclass(frozen=True)
 class View:

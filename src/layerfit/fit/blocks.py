@@ -11,9 +11,7 @@ import numpy as np
 
 from .._chunk import struct
 from ..capture.samples import Samples
-
-LARGEST = 4096
-"""Pixels in a block: fewer, and the loop over blocks costs more than the pixels in it."""
+from ..render import block_size
 
 
 @struct
@@ -85,7 +83,7 @@ def arrange(references: list[Samples], scales: np.ndarray | None, seed: int) -> 
     """Blocks of all references; `scales` (references, layers) or None. The references take turns, block by block."""
     lights = max(s.wi.shape[1] for s in references)
     longest = max(len(s.index) for s in references)
-    size = min(LARGEST, _power_of_two(longest), _power_of_two(16 * LARGEST // lights))
+    size = min(block_size(lights), _power_of_two(longest))
     rows: list[tuple[int, np.ndarray]] = []
     for k, samples in enumerate(references):
         order = stratified(samples, seed + k)

@@ -8,12 +8,14 @@ from typing import Any
 import jax
 import numpy as np
 
+from .._compiled import CLOCK, Clock
 from ..capture.samples import QUADRATURE, Samples, View
 from ..errors import InputError
+from ..render import predict
 from ..stack import Stack
 from .blocks import Blocks, arrange
 from .parameters import Parametrisation, parametrise, with_fixed
-from .residuals import Clock, initial, predict, step
+from .residuals import initial, scaled, step
 from .solve import NormalLevenbergMarquardt
 from .uncertainty import GROUPS, Uncertainty, estimate
 from .weights import inverse_sigma, robust
@@ -123,7 +125,7 @@ class _Fit:
         self.views, self.weights, self.loss, self.starts, self.seed, self.where = views, weights, loss, starts, seed, where
         self.progress = progress
         self.trace: list[Row] = []
-        self.clock = Clock()
+        self.clock = dataclasses.replace(CLOCK)
         self.began = time.perf_counter()
         self.samples = [view.samples(_chosen(view, len(views), seed), DIRECTIONS, seed) for view in views]
         self.blocks, self.layout = arrange(self.samples, _scales(views, start), seed)
@@ -147,11 +149,9 @@ class _Fit:
             self.progress("fine", (k + 1) / ROUNDS)
         held = (u <= self.bounds[0]) | (u >= self.bounds[1])
         uncertainty = estimate(gram, cost, self._residuals(), held, self._parts(u))
-        stack = self.free.put(self.start, self.free.fields(u))
-        stack = jax.tree.map(lambda a: np.asarray(a, np.float32), stack)
-        models = self._models(u)
+        clock = CLOCK.since(self.clock)
         return FitResult(
-            stack=stack,
+            stack=self._material(u),
             start=self.start,
             free=self.free,
             vector=u,
@@ -165,11 +165,11 @@ class _Fit:
             minima=minima,
             notes=self.notes,
             trace=self.trace,
-            models=models,
+            models=self._models(u),
             samples=self.samples,
             views=self.views,
-            clock=self.clock,
-            solve_s=time.perf_counter() - self.began - self.clock.trace_s - self.clock.compile_s,
+            clock=clock,
+            solve_s=time.perf_counter() - self.began - clock.trace_s - clock.compile_s,
         )
 
     def _residuals(self) -> int:
@@ -190,16 +190,22 @@ class _Fit:
         self.blocks = jax.device_put(dataclasses.replace(self.blocks, inverse_sigma=weight))
 
     def _models(self, u: np.ndarray) -> list[np.ndarray]:
-        values = predict(self.clock, jax.numpy.asarray(u), self.start, self.blocks, free=self.free)
-        return self.layout.gather(np.asarray(values), [len(s.index) for s in self.samples])
+        stack = self._material(u)
+        return [
+            predict(scaled(stack, view.scales(stack)), *samples.arrays)
+            for view, samples in zip(self.views, self.samples, strict=True)
+        ]
+
+    def _material(self, u: np.ndarray) -> Stack:
+        stack = self.free.put(self.start, self.free.fields(u), np)
+        return jax.tree.map(lambda a: np.asarray(a, np.float32), stack)
 
     def _step(self, u: Any, state: Any, blocks: Blocks, count: int) -> Any:
-        bounds = tuple(map(jax.numpy.asarray, self.bounds))
-        return step(self.clock, u, state, bounds, self.start, blocks, np.int32(count), free=self.free, solver=self.solver)
+        return step(u, state, self.bounds, self.start, blocks, np.int32(count), free=self.free, solver=self.solver)
 
     def _descend(self, u: Any, count: int, most: int, stage: str, start: int) -> tuple[np.ndarray, float, bool, np.ndarray]:
         """Run the solver from `u` on the first `count` blocks; returns the point, its cost, whether it converged, and J^T J."""
-        u = jax.numpy.asarray(u, float)
+        u = np.asarray(u, float)
         state = initial(u, self.solver)
         scale = max(self.brightness[:count].sum(), 1e-30)
         for k in range(most):
@@ -217,7 +223,7 @@ class _Fit:
 
     def _drop_blind(self, origin: np.ndarray) -> None:
         """Hold what has no effect on these images, with a reason; a parameter that the user asked for by name is an error."""
-        at = jax.numpy.asarray(origin)
+        at = np.asarray(origin)
         _, state = self._step(at, initial(at, self.solver), self.blocks, self.layout.used)
         if not np.isfinite(float(state.loss)):
             raise InputError(f"{self.where}: the start gives no finite image; choose other values in [material]")
@@ -254,7 +260,7 @@ class _Fit:
     def _parts(self, u: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Gradient and J^T J of parts of the image: sectors around the highlight, each with a share of every half angle."""
         sector = self.layout.scatter([_sectors(samples, GROUPS) for samples in self.samples], -1.0)
-        at = jax.numpy.asarray(u)
+        at = np.asarray(u)
         parts = []
         for g in range(GROUPS):
             weight = np.where(sector[..., None] == g, self.blocks.inverse_sigma, 0.0)

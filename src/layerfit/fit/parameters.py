@@ -73,11 +73,11 @@ class Parametrisation:
         """The vector as one scalar or (3,) array a field, still in the coordinate of the fit."""
         return [u[f.slots[0]] if len(f.slots) == 1 else u[f.slots[0] : f.slots[-1] + 1] for f in self.free]
 
-    def put(self, stack: Stack, fields: Sequence[Any]) -> Stack:
+    def put(self, stack: Stack, fields: Sequence[Any], xp: Any = jnp) -> Stack:
         """The material with its free fields replaced; `fields` as `fields` gives them."""
         layers = [*stack.layers, stack.base]
         for f, u in zip(self.free, fields, strict=True):
-            layers[f.layer] = dataclasses.replace(layers[f.layer], **{f.field: f.from_steps(u)})
+            layers[f.layer] = dataclasses.replace(layers[f.layer], **{f.field: f.from_steps(u, xp)})
         return dataclasses.replace(stack, layers=tuple(layers[:-1]), base=layers[-1])
 
     def values(self, u: np.ndarray) -> dict[str, Any]:

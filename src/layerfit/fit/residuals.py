@@ -1,20 +1,19 @@
-"""Residuals of a material against blocks of samples, and the compiled functions of a fit."""
+"""Residuals of a material against blocks of samples, and the compiled step of a fit."""
 
 import dataclasses
-import time
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
+from .._compiled import Compiled
 from ..layers import Coat
 from ..render import radiance
 from ..stack import Stack
 from .blocks import Blocks
 from .parameters import Parametrisation
-from .solve import normal_equations
+from .solve import normal_equations, products
 
 
 def scaled(stack: Stack, scale: Any) -> Stack:
@@ -44,7 +43,6 @@ def _block(blocks: Blocks, k: Any) -> Blocks:
 def _normal(u: Any, start: Stack, free: Parametrisation, blocks: Blocks, count: Any) -> Any:
     """Normal equations over the first `count` blocks."""
     fields = free.fields(u)
-    slots = tuple(f.slots for f in free.free)
 
     def of_block(k: Any) -> Any:
         block = _block(blocks, k)
@@ -53,38 +51,12 @@ def _normal(u: Any, start: Stack, free: Parametrisation, blocks: Blocks, count: 
             model = radiance(_material(start, free, fields, block), block.wi, block.wo, block.weight)
             return (model - block.target) * block.inverse_sigma
 
-        return normal_equations(residual, [f.astype(block.target.dtype) for f in fields], slots)
+        return products(residual, [f.astype(block.target.dtype) for f in fields])
 
-    zero = jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), jax.eval_shape(of_block, jnp.int32(0)))
-    return jax.lax.fori_loop(0, count, lambda k, total: jax.tree.map(jnp.add, total, of_block(k)), zero)
-
-
-@dataclasses.dataclass
-class Clock:
-    """Seconds that went into tracing and compiling, apart from running."""
-
-    trace_s: float = 0.0
-    compile_s: float = 0.0
-
-
-class Compiled:
-    """A traced function with one executable for each structure and size of its arguments, made when it is first called."""
-
-    def __init__(self, fn: Callable[..., Any], static: tuple[str, ...]):
-        self._jit = jax.jit(fn, static_argnames=static)
-        self._executables: dict[Any, Any] = {}
-
-    def __call__(self, clock: Clock, *args: Any, **static: Any) -> Any:
-        leaves, structure = jax.tree.flatten(args)
-        key = (structure, tuple((np.shape(a), np.result_type(a)) for a in leaves), tuple(static.values()))
-        if key not in self._executables:
-            start = time.perf_counter()
-            lowered = self._jit.trace(*args, **static).lower()
-            traced = time.perf_counter()
-            self._executables[key] = lowered.compile()
-            clock.trace_s += traced - start
-            clock.compile_s += time.perf_counter() - traced
-        return jax.block_until_ready(self._executables[key](*args))
+    columns = len(free.free) + 1
+    zero = jnp.zeros((columns, columns, blocks.target.shape[-1]))
+    total = jax.lax.fori_loop(0, count, lambda k, total: total + of_block(k), zero)
+    return normal_equations(total, tuple(f.slots for f in free.free))
 
 
 def _step(
@@ -100,18 +72,7 @@ def _step(
 step = Compiled(_step, ("free", "solver"))
 
 
+@partial(jax.jit, static_argnames="solver")
 def initial(u: Any, solver: Any) -> Any:
     """State of the solver before its first step at `u`."""
     return solver.init(None, u, None, {}, None, None, frozenset())
-
-
-def _predict(u: Any, start: Stack, blocks: Blocks, *, free: Parametrisation) -> Any:
-    """Radiance of every pixel of every block, (blocks, pixels, 3)."""
-
-    def of_block(block: Blocks) -> Any:
-        return radiance(_material(start, free, free.fields(u), block), block.wi, block.wo, block.weight)
-
-    return jax.lax.map(of_block, blocks)
-
-
-predict = Compiled(_predict, ("free",))

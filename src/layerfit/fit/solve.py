@@ -12,6 +12,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import lineax as lx
+import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float, PyTree
 
@@ -19,41 +20,33 @@ Normal = tuple[Float[Array, ""], tuple[Float[Array, " n"], Float[Array, "n n"]]]
 """Half the sum of squares, its gradient, and J^T J."""
 
 
-def normal_equations(residual: Callable[[list[Any]], Any], fields: list[Any], slots: tuple[tuple[int, ...], ...]) -> Normal:
-    """Half the sum of squares of `residual(fields)`, its gradient and J^T J, in float64.
+def products(residual: Callable[[list[Any]], Any], fields: list[Any]) -> Float[Array, "k k c"]:
+    """Inner products over the pixels, channel by channel and in float64, of the k - 1 columns of the Jacobian and the residual.
 
     `residual` maps fields, each a scalar or one value a channel, to (pixels, channels); its channel c must depend on channel c of
-    a colour only. `slots` are the places of each field's entries in the vector of parameters.
+    a colour only. Products of several blocks of pixels add up; `normal_equations` reads them.
     """
-    columns: list[Any] = []
-    r: Any = 0.0
+    columns = []
+    r: Any = None
     for k, value in enumerate(fields):
         moved = lambda x, k=k: residual([*fields[:k], x, *fields[k + 1 :]])  # noqa: E731
         r, column = jax.jvp(moved, (value,), (jnp.ones_like(value),))
         columns.append(column)
-    over_pixels = lambda x: jnp.sum(x, 0, dtype=jnp.float64)  # noqa: E731
+    rows = jnp.stack([*columns, r]).astype(jnp.float64)
+    return jnp.einsum("kpc,lpc->klc", rows, rows)
+
+
+def normal_equations(products: Float[Array, "k k c"], slots: tuple[tuple[int, ...], ...]) -> Normal:
+    """Half the sum of squares, its gradient and J^T J; `slots` are the places of each field's entries in the vector of parameters."""
+    channels = products.shape[-1]
     size = sum(len(s) for s in slots)
-    gradient = jnp.zeros(size)
-    gram = jnp.zeros((size, size))
-    for k, (a, at) in enumerate(zip(columns, slots, strict=True)):
-        gradient = gradient.at[jnp.array(at)].set(_entries(over_pixels(a * r), len(at) > 1))
-        for b, bt in zip(columns[: k + 1], slots[: k + 1], strict=True):
-            block = _block(over_pixels(a * b), len(at) > 1, len(bt) > 1)
-            gram = gram.at[jnp.ix_(jnp.array(at), jnp.array(bt))].set(block)
-            gram = gram.at[jnp.ix_(jnp.array(bt), jnp.array(at))].set(block.T)
-    return 0.5 * jnp.sum(r * r, dtype=jnp.float64), (gradient, gram)
-
-
-def _entries(channels: Any, colour: bool) -> Any:
-    return channels if colour else jnp.sum(channels)[None]
-
-
-def _block(channels: Any, colour_row: bool, colour_column: bool) -> Any:
-    if colour_row and colour_column:
-        return jnp.diag(channels)
-    if colour_row or colour_column:
-        return channels[:, None] if colour_row else channels[None, :]
-    return jnp.sum(channels)[None, None]
+    # entry[k, c, i]: channel c of field k is, or is part of, parameter i.
+    entry = np.zeros((len(slots), channels, size))
+    for k, at in enumerate(slots):
+        entry[k, np.arange(channels), at if len(at) > 1 else at[0]] = 1.0
+    gram = jnp.einsum("kci,klc,lcj->ij", entry, products[:-1, :-1], entry)
+    gradient = jnp.einsum("kci,kc->i", entry, products[:-1, -1])
+    return 0.5 * jnp.sum(products[-1, -1]), (gradient, gram)
 
 
 class _State(eqx.Module):

@@ -2,14 +2,11 @@
 
 import dataclasses
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
-from ..stack import Stack, evaluate
+from ..render import predict
 from .export import Shader
 from .gl import renderer, shade_points
 
@@ -76,16 +73,10 @@ def check_image(image: np.ndarray, model: np.ndarray, index: np.ndarray, width: 
 def check_pairs(shader: Shader, count: int = 65536, seed: int = 0) -> Parity:
     """Parity of the BRDF on random and extreme pairs of directions."""
     wi, wo = random_pairs(count, seed)
-    model = np.asarray(_brdf(shader.stack.astype(jnp.float32), wi, wo))
-    values = shade_samples(shader, wi[:, None], wo, np.ones_like(wi)[:, None])
+    samples = wi[:, None], wo, np.ones_like(wi)[:, None]
+    model, values = predict(shader.stack, *samples), shade_samples(shader, *samples)
     describe = lambda row: {"wi": wi[row].tolist(), "wo": wo[row].tolist()}  # noqa: E731
     return compare(values, model, FLOOR / np.pi, describe)
-
-
-@jax.jit
-def _brdf(stack: Stack, wi: Any, wo: Any) -> Any:
-    one = partial(evaluate, stack.form, stack.prepare())
-    return jax.vmap(lambda i, o: jnp.broadcast_to(one(i, o), (3,)))(wi, wo)
 
 
 def random_pairs(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
