@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
-import numpy as np
 
 
 @dataclasses.dataclass
@@ -32,7 +31,7 @@ class Compiled:
 
     def __call__(self, *args: Any, **static: Any) -> Any:
         leaves, structure = jax.tree.flatten(args)
-        key = (structure, tuple((np.shape(a), np.result_type(a)) for a in leaves), tuple(static.values()))
+        key = (structure, tuple((a.shape, a.dtype) for a in leaves), tuple(static.values()))
         if key not in self._executables:
             start = time.perf_counter()
             lowered = self._jit.trace(*args, **static).lower()

@@ -43,7 +43,7 @@ def normal_equations(products: Float[Array, "k k c"], slots: tuple[tuple[int, ..
     # entry[k, c, i]: channel c of field k is, or is part of, parameter i.
     entry = np.zeros((len(slots), channels, size))
     for k, at in enumerate(slots):
-        entry[k, np.arange(channels), at if len(at) > 1 else at[0]] = 1.0
+        entry[k, np.arange(channels), np.array(at)] = 1.0
     gram = jnp.einsum("kci,klc,lcj->ij", entry, products[:-1, :-1], entry)
     gradient = jnp.einsum("kci,kc->i", entry, products[:-1, -1])
     return 0.5 * jnp.sum(products[-1, -1]), (gradient, gram)
