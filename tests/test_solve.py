@@ -1,0 +1,132 @@
+"""The solver on problems that are known, and its normal equations against derivatives taken another way."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from layerfit.fit.residuals import initial
+from layerfit.fit.solve import NormalLevenbergMarquardt, normal_equations, products
+from layerfit.fit.uncertainty import estimate
+
+SLOTS = ((0,), (1, 2, 3), (4,))
+RNG = np.random.default_rng(1)
+X = RNG.uniform(0.1, 2.0, (200, 1))
+
+
+def model(fields):
+    """Channel c sees channel c of the colour, and both scalars."""
+    width, colour, level = fields
+    return colour * jnp.exp(-((X / width) ** 2)) + level**2 * X
+
+
+def fields(u):
+    return [u[at[0]] if len(at) == 1 else u[jnp.array(at)] for at in SLOTS]
+
+
+TRUTH = np.array([0.7, 0.5, 1.0, 2.0, 0.3])
+TARGET = np.asarray(model(fields(jnp.asarray(TRUTH)))) + 0.01 * RNG.normal(size=(200, 3))
+
+
+SOLVER = NormalLevenbergMarquardt()
+
+
+def residual(f, target=TARGET):
+    return model(f) - target
+
+
+@partial(jax.jit, static_argnames="residual")
+def step(y, state, bounds, target, residual):
+    fn = lambda u, target: normal_equations(products(lambda f: residual(f, target), fields(u)), SLOTS)  # noqa: E731
+    return SOLVER.step(fn, y, target, dict(zip(("lower", "upper"), bounds, strict=True)), state, frozenset())[:2]
+
+
+def minimise(start, lower=-np.inf, upper=np.inf, target=TARGET, residual=residual):
+    y = jnp.asarray(start, float)
+    state = initial(y, SOLVER)
+    path = []
+    for _ in range(200):
+        y, state = step(y, state, (np.full(5, lower), np.full(5, upper)), target, residual)
+        path.append(np.asarray(y))
+        if state.done:
+            break
+    return np.asarray(y), state, np.array(path)
+
+
+def test_normal_equations_are_those_of_the_dense_jacobian():
+    u = jnp.array([0.6, 0.4, 0.9, 1.5, 0.5])
+    r = np.asarray(residual(fields(u))).ravel()
+    jacobian = np.asarray(jax.jacfwd(lambda u: residual(fields(u)).ravel())(u))
+    loss, (gradient, gram) = normal_equations(products(residual, fields(u)), SLOTS)
+    np.testing.assert_allclose(loss, 0.5 * r @ r, rtol=1e-13)
+    np.testing.assert_allclose(gradient, jacobian.T @ r, rtol=1e-12)
+    np.testing.assert_allclose(gram, jacobian.T @ jacobian, rtol=1e-12, atol=1e-12)
+
+
+def test_sums_of_float32_residuals_are_float64():
+    u = jnp.array([0.6, 0.4, 0.9, 1.5, 0.5])
+    narrow = [f.astype(np.float32) for f in fields(u)]
+    sums = products(lambda f: residual(f).astype(np.float32), narrow)
+    assert sums.dtype == np.float64
+    np.testing.assert_allclose(sums, products(residual, fields(u)), rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("start", [[0.3, 1.0, 1.0, 1.0, 1.0], [2.0, 0.1, 0.1, 0.1, 0.01]])
+def test_the_minimum_is_that_of_scipy(start):
+    u, state, _ = minimise(start)
+    wanted = least_squares(lambda u: np.asarray(residual(fields(jnp.asarray(u)))).ravel(), start, xtol=1e-12, ftol=1e-12)
+    assert state.done
+    assert float(state.loss) == pytest.approx(wanted.cost, rel=1e-6)
+    np.testing.assert_allclose(np.abs(u), np.abs(wanted.x), rtol=1e-3)
+
+
+def test_bounds_always_hold_and_the_rest_is_fitted():
+    start = np.array([0.3, 1.0, 1.0, 1.0, 1.0])
+    u, state, path = minimise(start, lower=0.0, upper=1.2)
+    wanted = least_squares(lambda u: np.asarray(residual(fields(jnp.asarray(u)))).ravel(), start, bounds=(0.0, 1.2))
+    assert state.done and path.min() >= 0.0 and path.max() <= 1.2
+    assert u[3] == 1.2  # the truth, 2, lies outside
+    assert float(state.loss) == pytest.approx(wanted.cost, rel=1e-4)
+
+
+def test_units_of_the_parameters_do_not_matter():
+    units = jnp.array([1.0, 1e-2, 1e3, 1.0, 1e2])
+    scaled = lambda f, target: residual([a * u for a, u in zip(f, fields(units), strict=True)], target)  # noqa: E731
+    plain, _, _ = minimise([0.3, 1.0, 1.0, 1.0, 1.0])
+    u, _, _ = minimise(np.array([0.3, 1.0, 1.0, 1.0, 1.0]) / units, residual=scaled)
+    np.testing.assert_allclose(u * units, plain, rtol=1e-4)
+
+
+def test_a_trial_that_is_not_finite_is_stepped_back_from():
+    cliff = lambda f, target: residual(f, target) + jnp.where(f[0] > 0.75, jnp.nan, 0.0)  # noqa: E731
+    u, state, _ = minimise([0.3, 1.0, 1.0, 1.0, 1.0], residual=cliff)
+    assert np.isfinite(state.loss) and abs(u[0] - 0.7) < 0.02
+
+
+def test_sigmas_are_the_scatter_of_repeated_fits():
+    @jax.jit
+    def part(u, target, weight):
+        return normal_equations(products(lambda f: residual(f, target) * weight[:, None], fields(u)), SLOTS)[1]
+
+    truth = np.asarray(model(fields(jnp.asarray(TRUTH))))
+    groups = np.arange(200) % 12 == np.arange(12)[:, None]
+    found, sigmas = [], []
+    for seed in range(60):
+        target = truth + 0.02 * np.random.default_rng(seed).normal(size=truth.shape)
+        u, state, _ = minimise(TRUTH, target=target)
+        parts = [tuple(map(np.asarray, part(u, target, group.astype(float)))) for group in groups]
+        found.append(u)
+        sigmas.append(estimate(np.asarray(state.gram), float(state.loss), target.size, np.zeros(5, bool), parts).sigma)
+    # The larger of two estimates: never below the scatter, above it by what a maximum of two is.
+    ratio = np.mean(sigmas, 0) / np.std(found, 0)
+    assert np.all(ratio > 0.8) and np.all(ratio < 1.8)
+
+
+def test_a_direction_that_nothing_sees_is_named():
+    gram = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 2.0]])
+    found = estimate(gram, 1.0, 100, np.zeros(3, bool), [(np.zeros(3), gram / 2)] * 2)
+    assert len(found.blind) == 1
+    np.testing.assert_allclose(np.abs(found.blind[0]), [0.5**0.5, 0.5**0.5, 0.0], atol=1e-9)
