@@ -234,16 +234,16 @@ def verify(
     use_compilation_cache()
     from .job import verify_preset
     from .preset import read_preset
-    from .report.text import verdict, worst
+    from .report.text import image_error, relative, verdict, worst
 
     document, picture = verify_preset(read_preset(preset), preset.stem, scene, output, fail, hardfail)
     parity = document["parity"]
     _say(f"Drawn by {document['renderer']}")
-    _say(f"shader against JAX: max {parity['max_rel']:.2e}, p99.9 {parity['p999_rel']:.2e} relative, {parity['values']} values")
+    most, usual = relative(parity["max_rel"]), relative(parity["p999_rel"])
+    _say(f"shader against JAX: max {most}, p99.9 {usual} relative, {parity['values']} values")
     _say(f"worst value: {worst(parity['worst'])}")
-    if image := document["image"]:
-        measures = f"PSNR {image['psnr_db']:.1f} dB, SSIM {image['ssim']:.4f}, delta E 2000 {image['delta_e']:.2f}"
-        _say(f"shader against reference: {measures}")
+    if document["image"]:
+        _say(f"shader against reference: {image_error(document['image'])}")
     if picture:
         _say(f"Wrote {picture}")
     _say(verdict(document))

@@ -6,7 +6,7 @@ from typing import Any
 from ._data import references
 from .documents import check_directory
 from .job import Outcome, fit_scene
-from .report.text import measured
+from .report.text import image_error, measured, relative
 
 
 def run(directory: Path, console: Any) -> bool:
@@ -32,8 +32,8 @@ def run(directory: Path, console: Any) -> bool:
 
 def _summary(document: dict[str, Any]) -> list[str]:
     rows = [f"{name} = {' +/- '.join(measured(row['value'], row['sigma']))}" for name, row in document["parameters"].items()]
-    error, parity = document["error"], document["parity"]
+    parity = document["parity"]
     return [
         ", ".join(rows),
-        f"fit error {error['rel_l2']:.3g} relative L2, shader against JAX {parity['max_rel']:.1e}, {document['time']['total_s']:.1f} s",
+        f"fit error {image_error(document['error'])}; shader against JAX {relative(parity['max_rel'])}, {document['time']['total_s']:.1f} s",
     ]

@@ -2,6 +2,7 @@
 
 import difflib
 import json
+import math
 import os
 import tempfile
 import tomllib
@@ -34,6 +35,15 @@ def read_document(path: Path) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise InputError(f"{path}: should hold a table of keys, not a {type(document).__name__}")
     return document
+
+
+def finite(value: Any) -> Any:
+    """The value with None for NaN and infinity, at any depth: JSON has no word for them."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

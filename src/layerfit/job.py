@@ -14,7 +14,7 @@ import numpy as np
 from .capture.exr import write_exr
 from .capture.samples import QUADRATURE, Samples, View, load
 from .capture.scene import read_scene
-from .documents import check_directory, write_bytes, write_text
+from .documents import check_directory, finite, write_bytes, write_text
 from .errors import InputError
 from .fit.fit import FitResult, fit
 from .fit.metrics import exposure, image_error
@@ -99,7 +99,7 @@ def fit_scene(
         "pictures_s": now - verified,
     }
     parity_document = parity.to_json() | {"passed": parity.passed, "renderer": parity.renderer}
-    document = to_json(result, errors, parity_document, seconds, "preset.json")
+    document = finite(to_json(result, errors, parity_document, seconds, "preset.json"))
     document["flags"] += [] if parity.passed else ["shader_differs"]
     document["model"] = _model(result.stack)
     document["pixels"]["usable"] = sum(len(view.index) for view in result.views)
@@ -116,7 +116,7 @@ def fit_scene(
     write_bytes(directory / "fit.png", picture)
     write_text(directory / "preset.json", json.dumps(preset_of(result.stack, name, fit=_summary(document)), indent=2) + "\n")
     write_text(directory / "report.html", html.page(name, document, picture, convergence, shader.text()))
-    write_text(directory / "fit.json", json.dumps(document, indent=2) + "\n")
+    write_text(directory / "fit.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
     return Outcome(document, directory, result.converged and parity.passed)
 
 
@@ -287,7 +287,7 @@ def verify_preset(
     most, usual = MAX_REL if hardfail is None else hardfail, P999_REL if fail is None else fail
     document = {
         "parity": parity.to_json(),
-        "image": mean_error(drawings) if drawings else {},
+        "image": finite(mean_error(drawings)) if drawings else {},
         "passed": parity.max_rel <= most and parity.p999_rel <= usual,
         "renderer": parity.renderer,
     }

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..documents import finite
 from ..errors import InputError
 from .channels import ROLES, Channels, resolve
 from .checks import Finding, check
@@ -44,7 +45,7 @@ class Inspection:
             "left_out": exr.left_out,
             "roles": None if self.channels is None else {role: self._role(self.channels, role) for role in ROLES},
             "findings": [asdict(finding) for finding in self.findings],
-            "header": _finite(exr.header),
+            "header": finite(exr.header),
         }
 
     def render(self) -> "Group":
@@ -125,12 +126,3 @@ def inspect(
         advice = "Say in the scene's [reference] which channels are meant."
         return Inspection(exr, None, [Finding("channels cannot be told", "warning", str(error), advice)])
     return Inspection(exr, channels, check(channels, exr, eye))
-
-
-def _finite(value: Any) -> Any:
-    """The value with None for NaN and infinity, at any depth."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

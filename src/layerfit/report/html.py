@@ -5,7 +5,7 @@ import html
 from collections.abc import Mapping
 from typing import Any
 
-from .text import lines, measured, number, states
+from .text import image_error, lines, measured, number, relative, states
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #18181b; --paper: #fafafa; --line: #d4d4d8; --soft: #71717a; }
@@ -50,9 +50,9 @@ def _row(name: str, row: Mapping[str, Any]) -> str:
 
 def _verdict(document: Mapping[str, Any]) -> str:
     """The result in a sentence."""
-    error, parity = document["error"], document["parity"]
+    parity = document["parity"]
     return (
-        f"The fit {'converged' if document['converged'] else 'did NOT converge'}: {100.0 * error['rel_l2']:.2g} % from the reference "
-        f"(relative L2), delta E 2000 {error['delta_e']:.2f}. The shader {'is' if parity['passed'] else 'is NOT'} the fitted material: "
-        f"it differs from JAX by {parity['max_rel']:.1e} at most."
+        f"The fit {'converged' if document['converged'] else 'did NOT converge'}; its error is {image_error(document['error'])}. "
+        f"The shader {'is' if parity['passed'] else 'is NOT'} the fitted material: "
+        f"the largest relative difference from JAX is {relative(parity['max_rel'])}."
     )

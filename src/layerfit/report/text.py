@@ -10,15 +10,14 @@ import numpy as np
 def lines(document: Mapping[str, Any]) -> list[str]:
     """The blocks of a `fit.json` document as text."""
     d = document
-    error, pixels = d["error"], d["pixels"]
+    pixels = d["pixels"]
     out = ["[[Fit]]"]
     out += _rows(
         {
             "model": f"{d['model']['layers']}, {d['model']['name']} form{_options(d['model']['options'])}",
             "converged": f"{'yes' if d['converged'] else 'NO'}, after {d['steps']} steps",
             "flags": ", ".join(d["flags"]) or "none",
-            "error": f"{error['rel_l2']:.3g} relative L2, PSNR {error['psnr_db']:.1f} dB, SSIM {error['ssim']:.4f}, "
-            f"delta E 2000 {error['delta_e']:.2f}",
+            "error": image_error(d["error"]),
             "pixels": f"{_pixels(pixels)}{_dropped(pixels['dropped'])}",
             "weights": _weights(d["weighting"]),
             "light": _light(d["quadrature"]),
@@ -41,7 +40,7 @@ def lines(document: Mapping[str, Any]) -> list[str]:
     parity = d["parity"]
     out += [
         f"[[Shader]] (drawn by {parity['renderer']})",
-        f"    against JAX: max {parity['max_rel']:.1e}, p99.9 {parity['p999_rel']:.1e} relative: {verdict(parity)}",
+        f"    against JAX: max {relative(parity['max_rel'])}, p99.9 {relative(parity['p999_rel'])} relative: {verdict(parity)}",
         f"    worst value: {worst(parity['worst'])}",
     ]
     return [*out, "[[Time]]", f"    {_time(d['time'])}"]
@@ -52,13 +51,33 @@ def verdict(parity: Mapping[str, Any]) -> str:
     return "PASS" if parity["passed"] else "FAILURE"
 
 
+def image_error(error: Mapping[str, float | None]) -> str:
+    """How far one image is from another."""
+    measures = {
+        "rel_l2": "{:.3g} relative L2",
+        "psnr_db": "PSNR {:.1f} dB",
+        "ssim": "SSIM {:.4f}",
+        "delta_e": "delta E 2000 {:.2f}",
+    }
+    values = {key: error[key] for key in measures}
+    if None in values.values():
+        return "not finite"
+    return ", ".join(measures[key].format(value) for key, value in values.items())
+
+
+def relative(value: float | None) -> str:
+    """A relative difference, which a value that is not finite has none of."""
+    return "not finite" if value is None else f"{value:.1e}"
+
+
 def worst(place: Mapping[str, Any]) -> str:
     """Where a shader differs most from JAX: a pixel, or a pair of directions."""
     if "x" in place:
         where = f"pixel x {place['x']}, y {place['y']}"
     else:
         where = ", ".join(f"{key} ({', '.join(f'{v:.6f}' for v in place[key])})" for key in ("wi", "wo"))
-    return f"{place['channel']} at {where}: shader {place['shader']:.8g}, JAX {place['jax']:.8g}"
+    shader, jax = ("not finite" if place[by] is None else f"{place[by]:.8g}" for by in ("shader", "jax"))
+    return f"{place['channel']} at {where}: shader {shader}, JAX {jax}"
 
 
 def _rows(rows: Mapping[str, str]) -> list[str]:

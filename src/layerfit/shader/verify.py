@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..documents import finite
 from ..render import predict
 from .export import Shader
 from .gl import renderer, shade_points
@@ -33,7 +34,8 @@ class Parity:
         return self.max_rel <= MAX_REL and self.p999_rel <= P999_REL
 
     def to_json(self) -> dict[str, Any]:
-        return {"max_rel": self.max_rel, "p999_rel": self.p999_rel, "worst": self.worst, "values": self.count}
+        """Plain values; what is not finite is None."""
+        return finite({"max_rel": self.max_rel, "p999_rel": self.p999_rel, "worst": self.worst, "values": self.count})
 
 
 def together(parities: Sequence[Parity]) -> Parity:
@@ -51,7 +53,7 @@ def compare(shader: np.ndarray, model: np.ndarray, floor: float, describe: Any =
     worst = {"channel": "rgb"[channel], "shader": float(shader[row, channel]), "jax": float(model[row, channel])}
     return Parity(
         float(difference.max()),
-        float(np.quantile(difference, 0.999)),
+        float(np.quantile(difference, 0.999, method="higher")),  # without a mean of two, of which one may be infinite
         describe(int(row)) | worst,
         int(difference.size),
         renderer(),
