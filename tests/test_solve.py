@@ -87,7 +87,9 @@ def test_bounds_always_hold_and_the_rest_is_fitted():
     start = np.array([0.3, 1.0, 1.0, 1.0, 1.0])
     u, state, path = minimise(start, lower=0.0, upper=1.2)
     wanted = least_squares(lambda u: np.asarray(residual(fields(jnp.asarray(u)))).ravel(), start, bounds=(0.0, 1.2))
-    assert state.done and path.min() >= 0.0 and path.max() <= 1.2
+    assert state.done
+    assert path.min() >= 0.0
+    assert path.max() <= 1.2
     assert u[3] == 1.2  # the truth, 2, lies outside
     assert float(state.loss) == pytest.approx(wanted.cost, rel=1e-4)
 
@@ -103,7 +105,8 @@ def test_units_of_the_parameters_do_not_matter():
 def test_a_trial_that_is_not_finite_is_stepped_back_from():
     cliff = lambda f, target: residual(f, target) + jnp.where(f[0] > 0.75, jnp.nan, 0.0)  # noqa: E731
     u, state, _ = minimise([0.3, 1.0, 1.0, 1.0, 1.0], residual=cliff)
-    assert np.isfinite(state.loss) and abs(u[0] - 0.7) < 0.02
+    assert np.isfinite(state.loss)
+    assert abs(u[0] - 0.7) < 0.02
 
 
 def test_sigmas_are_the_scatter_of_repeated_fits():
@@ -122,7 +125,8 @@ def test_sigmas_are_the_scatter_of_repeated_fits():
         sigmas.append(estimate(np.asarray(state.gram), float(state.loss), target.size, np.zeros(5, bool), parts).sigma)
     # The larger of two estimates: never below the scatter, above it by what a maximum of two is.
     ratio = np.mean(sigmas, 0) / np.std(found, 0)
-    assert np.all(ratio > 0.8) and np.all(ratio < 1.8)
+    assert np.all(ratio > 0.8)
+    assert np.all(ratio < 1.8)
 
 
 def test_a_direction_that_nothing_sees_is_named():

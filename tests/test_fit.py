@@ -1,0 +1,165 @@
+"""From an image back to the material: on images that the model itself made, and on renders by others."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from helpers import COPPER
+from layerfit.capture.exr import write_exr
+from layerfit.capture.geometry import sphere_surface
+from layerfit.capture.samples import load_reference
+from layerfit.capture.scene import Camera, Constant, Directional, Reference, Sphere
+from layerfit.errors import InputError
+from layerfit.fit.fit import fit
+from layerfit.fit.residuals import scaled
+from layerfit.fit.result import to_json
+from layerfit.fit.weights import inverse_sigma, noise_law, robust
+from layerfit.layers import Coat
+from layerfit.render import predict
+from layerfit.stack import Stack
+from layerfit.surfaces import Conductor, Lambert
+
+CAMERA = Camera((0.8, 0.6, 4.9), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0)
+SUN = Directional((0.46175709, 0.55410852, 0.69263564), (np.pi, np.pi, np.pi))
+
+TRUTH = Stack((Coat(alpha=0.12, eta=1.5, tau=[0.08, 0.25, 0.7]),), Conductor(alpha=0.2, **COPPER))
+START = Stack((Coat(alpha=0.3, eta=1.35, tau=[0.3, 0.3, 0.3]),), Conductor(alpha=0.4, **COPPER))
+
+
+@pytest.fixture(scope="module")
+def see(tmp_path_factory):
+    """Views of a sphere of a material, made by the model, with noise if asked for."""
+    path = tmp_path_factory.mktemp("sphere") / "sphere.exr"
+    surface = sphere_surface(Sphere(), CAMERA, 48, 48)
+    write_exr(path, dict.fromkeys("RGB", np.where(surface.covered, 0.5, 0.0)) | {"A": surface.covered.astype(float)})
+
+    def make(stack=TRUTH, noise=0.0, lights=(SUN,), scale=None, seed=0):
+        reference = Reference(path, CAMERA, lights, Sphere(), {}, None, {} if scale is None else {"coat": scale})
+        view = load_reference(reference, 0.1)
+        samples = view.samples(np.arange(len(view.index)), 256)
+        image = predict(scaled(stack, view.scales(stack)), *samples.arrays)
+        image = image * (1.0 + noise * np.random.default_rng(seed).normal(size=image.shape))
+        return dataclasses.replace(view, target=image.astype(np.float32))
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def clean(see):
+    """The fit of an image without noise."""
+    return fit([see()], START, starts=3)
+
+
+def document(result):
+    return to_json(result, {}, None, {}, "preset.json")
+
+
+def values(result):
+    return {name: np.asarray(row["value"]) for name, row in document(result)["parameters"].items()}
+
+
+def test_an_image_of_the_model_gives_its_parameters_back(clean):
+    found = values(clean)
+    assert clean.converged
+    for name, wanted in {"coat.alpha": 0.12, "coat.eta": 1.5, "coat.tau": [0.08, 0.25, 0.7], "base.alpha": 0.2}.items():
+        np.testing.assert_allclose(found[name], wanted, rtol=2e-3, err_msg=name)
+    assert clean.cost < 1e-6 * sum(s.target.size for s in clean.samples)
+
+
+def test_what_is_not_asked_for_stays(clean):
+    np.testing.assert_array_equal(clean.stack.base.eta, np.float32(COPPER["eta"]))
+    assert set(values(clean)) == {"coat.alpha", "coat.eta", "coat.tau", "base.alpha"}
+
+
+def test_a_fit_is_the_same_twice_and_its_document_is_plain_json(see, clean):
+    again = fit([see()], START, starts=3)
+    np.testing.assert_array_equal(again.vector, clean.vector)
+    assert json.loads(json.dumps(document(again), allow_nan=False))["converged"] is True
+
+
+def test_sigmas_cover_the_truth(see):
+    result = fit([see(noise=0.03)], START, starts=2)
+    rows = document(result)["parameters"]
+    for name, wanted in {"coat.alpha": 0.12, "coat.eta": 1.5, "coat.tau": [0.08, 0.25, 0.7], "base.alpha": 0.2}.items():
+        error = np.abs(np.asarray(rows[name]["value"]) - wanted)
+        assert np.all(error < 4.0 * np.asarray(rows[name]["sigma"])), name
+        assert np.all(error < 0.05 * np.maximum(wanted, 0.3)), name
+
+
+def test_a_thickness_cannot_be_told_from_an_absorption(see):
+    coat = Coat(alpha=0.3, eta=1.35, absorption_per_mm=[6.0, 6.0, 6.0], thickness_um=50.0)
+    start = dataclasses.replace(START, layers=(coat,))
+    free = ["coat.alpha", "coat.eta", "coat.absorption_per_mm", "coat.thickness_um", "base.alpha"]
+    result = document(fit([see()], start, free=free, starts=2))
+    np.testing.assert_allclose(result["parameters"]["coat.tau"]["value"], [0.08, 0.25, 0.7], rtol=3e-3)
+    assert "coat.thickness_um" not in result["parameters"]
+    assert any("enter only as tau" in row["why"] for row in result["unidentified"])
+    assert "undetermined_direction" in result["flags"]
+
+
+def test_a_series_of_thicknesses_is_fitted_together(see):
+    thin, thick = see(scale=1.0), see(scale=3.0)
+    result = fit([thin, thick], START, starts=2)
+    np.testing.assert_allclose(values(result)["coat.tau"], [0.08, 0.25, 0.7], rtol=3e-3)
+    np.testing.assert_allclose(values(result)["coat.eta"], 1.5, rtol=2e-3)
+
+
+def test_light_from_everywhere_is_fitted_through_its_quadrature(see):
+    result = fit([see(lights=(Constant((1.0, 1.0, 1.0)), SUN))], START, starts=2)
+    np.testing.assert_allclose(values(result)["coat.tau"], [0.08, 0.25, 0.7], atol=0.02)
+    np.testing.assert_allclose(values(result)["base.alpha"], 0.2, rtol=0.03)
+
+
+def test_a_parameter_without_effect_is_refused_by_name(see):
+    opaque = Stack((Coat(alpha=0.12, eta=1.5, tau=40.0),), Conductor(alpha=0.2, **COPPER))
+    with pytest.raises(InputError, match=r"base\.alpha has no effect on this image"):
+        fit([see(opaque)], opaque, free=["coat.alpha", "base.alpha"], starts=1)
+
+
+def test_a_parameter_without_effect_that_was_not_asked_for_is_held_with_a_note(see):
+    opaque = Stack((Coat(alpha=0.2, eta=1.5, tau=40.0),), Conductor(alpha=0.2, **COPPER))
+    result = fit([see(opaque)], opaque, starts=1)
+    assert any("base.alpha" in note for note in result.notes)
+    assert "base.alpha" not in values(result)
+
+
+def test_a_parameter_that_wants_to_leave_its_range_is_flagged(see):
+    mirror = Stack((), Lambert(albedo=[1.0, 0.6, 0.2]))
+    view = see(mirror)
+    view = dataclasses.replace(view, target=view.target * np.float32(1.2))
+    result = document(fit([view], Stack((), Lambert(albedo=0.5)), starts=1))
+    assert result["parameters"]["base.albedo"]["at_bound"] == "upper"
+    assert "at_bound:base.albedo" in result["flags"]
+    assert np.max(result["parameters"]["base.albedo"]["value"]) <= 1.0
+
+
+def test_a_wall_of_pixels_too_bright_does_not_pull_a_robust_fit(see):
+    view = see()
+    spoiled = view.target.copy()
+    spoiled[np.random.default_rng(0).choice(len(spoiled), len(spoiled) // 50, replace=False)] *= 20.0
+    spoiled = dataclasses.replace(view, target=spoiled)
+    square, cauchy = (values(fit([spoiled], START, starts=2, loss=loss))["coat.tau"] for loss in ("square", "cauchy"))
+    error = [np.max(np.abs(found - [0.08, 0.25, 0.7])) for found in (square, cauchy)]
+    assert error[1] < 0.02
+    assert error[1] < 0.5 * error[0]
+
+
+def test_the_weights_follow_the_law_of_the_noise_not_its_accidents():
+    model = np.linspace(0.01, 2.0, 500)[:, None] * np.ones(3)
+    noise = 0.03 * model**0.7
+    lucky = noise * np.exp(np.random.default_rng(0).normal(size=noise.shape))
+    np.testing.assert_allclose(noise_law(model, noise), noise, rtol=1e-6)
+    np.testing.assert_allclose(noise_law(model, lucky), noise, rtol=0.1)
+    assert np.all(inverse_sigma(model, model, noise, "law") < inverse_sigma(model, model, None, "law"))
+    assert np.ptp(inverse_sigma(model, model, noise, "uniform"), axis=0).max() == 0.0
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_robust_factors_leave_the_bulk_and_lower_the_tail(loss):
+    residual = np.random.default_rng(0).normal(size=(1000, 3))
+    residual[0] = 100.0
+    factor = robust(residual, loss)
+    assert np.all(factor[0] < 0.2)
+    assert np.median(factor) > 0.9
