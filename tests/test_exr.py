@@ -11,8 +11,9 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from layerfit.capture import exr as module
-from layerfit.capture.exr import MAX_SAMPLES, read_exr, write_exr
+from layerfit.capture import layout
+from layerfit.capture.exr import read_exr, write_exr
+from layerfit.capture.layout import MAX_SAMPLES
 from layerfit.errors import InputError
 
 HEIGHT, WIDTH = 20, 30
@@ -245,7 +246,7 @@ def test_tiles_of_all_levels_are_counted(tmp_path: Path, mode: int, size: tuple[
                 data = image[y : y + side, x : x + side].tobytes()
                 blocks.append(struct.pack("<5i", x // side, y // side, column, row, len(data)) + data)
     (tmp_path / "t.exr").write_bytes(with_blocks(head, blocks))
-    assert module._tile_count(size, (side, side), mode) == len(blocks)
+    assert layout._tile_count(size, (side, side), mode) == len(blocks)
     np.testing.assert_array_equal(read_exr(tmp_path / "t.exr").channels["R"], np.arange(height * width).reshape(size))
 
 

@@ -115,8 +115,9 @@ def measured(value: Any, sigma: Any) -> tuple[str, str]:
         return values, sigmas
     if not sigma or not value:
         return number(value), number(sigma)
-    decimals = min(1 - math.floor(math.log10(sigma)), 6 - math.floor(math.log10(abs(value))))
-    return f"{value:.{max(decimals, 0)}f}", f"{sigma:.2g}"
+    wanted = 1 - math.floor(math.log10(sigma))
+    decimals = max(min(wanted, 6 - math.floor(math.log10(abs(value)))), 0)
+    return f"{value:.{decimals}f}", f"{sigma:.{decimals}f}" if decimals == wanted else f"{sigma:.2g}"
 
 
 def _options(options: Mapping[str, Any]) -> str:
