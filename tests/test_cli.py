@@ -5,6 +5,7 @@ import io
 import json
 import math
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +22,12 @@ from layerfit.preset import read_preset
 from layerfit.render import brdf
 
 COMMANDS = ("fit", "render", "eval", "export", "verify", "inspect", "demo")
+
+CONSTANT_LIGHT = """\
+[[light]]
+type = "constant"
+radiance_rgb = [1, 1, 1]
+[material]"""
 
 FOUND = 1e-3
 """How near a fit comes to the parameters of a render of its own model: the render holds float32."""
@@ -320,6 +327,44 @@ def test_the_demonstration_fits_what_is_shipped(scene, gl, tmp_path, monkeypatch
     assert "[1/1] scene" in ran.err
     assert str(tmp_path / "scene" / "fit.png") in ran.err
     assert (tmp_path / "scene" / "fit.json").is_file()
+
+
+def test_an_interrupt_is_said(scene, gl, tmp_path, monkeypatch):
+    def interrupted(*args, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("layerfit.job.fit", interrupted)
+    ran = layerfit("fit", scene, "-o", tmp_path / "out")
+    assert (ran.code, ran.out) == (130, "")
+    assert "interrupted" in ran.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_closed_pipe_is_no_fault(scene):
+    """As in `layerfit export preset.json | head -1`."""
+    arguments = [sys.executable, "-m", "layerfit", "export", scene.parent / "truth.json"]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as ran:
+        ran.stdout.close()
+        assert ran.stderr.read() == b""
+
+
+def test_light_from_everywhere_is_reported_as_a_quadrature(scene, gl, tmp_path, monkeypatch):
+    monkeypatch.setattr("layerfit.fit.fit.EVALUATIONS", 128 * 496)
+    monkeypatch.setattr("layerfit.job.PICTURE_SAMPLES", 1)
+    text = re.sub(r"\[\[light\]\].*?\[material\]", CONSTANT_LIGHT, scene.read_text(), flags=re.DOTALL)
+    text = re.sub(r"free = .*", 'free = ["coat.tau"]', text).replace("reference.exr", "lit.exr")
+    (tmp_path / "lit.toml").write_text(text)
+    shutil.copy(scene.parent / "reference.exr", tmp_path / "lit.exr")
+    assert layerfit("render", scene.parent / "truth.json", tmp_path / "lit.toml", "-o", tmp_path / "lit.exr").code == 0
+    ran = layerfit("fit", tmp_path / "lit.toml", "-o", tmp_path / "out", "--starts", "1", "--json")
+    document = json.loads(ran.out)
+    quadrature = document["quadrature"]
+    assert quadrature["directions"] == 64
+    assert 0.0 < quadrature["fit_rms"] < quadrature["rms"] < 0.2, "more directions, less error"
+    assert re.search(r"light: +quadrature: pictures 64 directions a pixel, [\d.]+ % rms error", ran.err)
+    pixels = document["pixels"]
+    assert pixels["used"] < pixels["usable"]
+    assert f"{pixels['used']} used, drawn at random from {pixels['usable']}" in ran.err
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -5,7 +5,6 @@ the machine is at fault, with a message that says what to do.
 """
 
 import json
-import os
 import sys
 import time
 from pathlib import Path
@@ -39,12 +38,10 @@ def main() -> None:
     except LayerfitError as error:
         stderr.print(f"[bold red]layerfit:[/] {_plain(error)}", soft_wrap=True)
         sys.exit(2)
-    except KeyboardInterrupt:
-        stderr.print("layerfit: interrupted; files that were complete are kept")
-        sys.exit(130)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+    except SystemExit as end:
+        if end.code == 130:  # what typer makes of an interrupt
+            _say("layerfit: interrupted; every file that was written is whole")
+        raise
 
 
 def _plain(error: Exception) -> str:

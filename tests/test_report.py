@@ -1,0 +1,160 @@
+"""Reports and pictures: what they say of a result, and what they show."""
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from layerfit.report import pictures
+from layerfit.report.text import image_error, lines, measured, relative, worst
+
+DOCUMENT = {
+    "model": {"name": "faithful", "options": {"refract_at": "n"}, "layers": "Coat over Lambert"},
+    "converged": False,
+    "flags": ["not_converged", "at_bound:coat.alpha"],
+    "steps": 12,
+    "starts": 3,
+    "minima": [{"start": 0, "cost": 1.0}, {"start": 2, "cost": 1.01}, {"start": 1, "cost": 7.0}],
+    "error": {"rel_l2": 0.1, "psnr_db": 30.0, "ssim": 0.9, "delta_e": 2.0},
+    "pixels": {"used": 50, "usable": 100, "dropped": [{"NaN or infinite": 3}, {"NaN or infinite": 4, "masked": 1}]},
+    "weighting": {"kind": "law", "loss": "huber", "model_share": 0.05, "floor_share": 0.02, "noise": [True, False]},
+    "quadrature": {"directions": 992, "rms": 0.0082, "fit_directions": 495, "fit_rms": 0.0139},
+    "parameters": {
+        "coat.alpha": {"value": 0.001, "start": 0.3, "sigma": None, "at_bound": "lower", "identifiable": False, "unit": "1"},
+        "coat.thickness_um": {"value": 50.0, "start": 10.0, "sigma": 3.1, "at_bound": None, "identifiable": True, "unit": "um"},
+        "coat.tau": {"value": [0.1, 0.2, 0.3], "sigma": [0.01, 0.02, None], "derived": "absorption_per_mm * thickness_um"},
+    },
+    "correlations": [["coat.alpha", "coat.tau[0]", -0.97]],
+    "unidentified": [{"direction": {}, "why": "a and b can change together without changing the image"}],
+    "notes": ["base.alpha has no effect on this image and was held at its start"],
+    "left_out": [],
+    "parity": {
+        "max_rel": None,
+        "p999_rel": 2e-6,
+        "worst": {"x": 3, "y": 4, "channel": "g", "shader": None, "jax": 0.25},
+        "passed": False,
+        "renderer": "a driver",
+    },
+    "time": {"total_s": 2.0, "import_s": 0.5, "solve_s": 1.5},
+}
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "Coat over Lambert, faithful form, refract_at = n",
+        "converged:   NO, after 12 steps",
+        "not_converged, at_bound:coat.alpha",
+        "50 used, drawn at random from 100 that can be compared; left out: 7 NaN or infinite, 1 masked",
+        "5 % of the value, 2 % of the image's brightness and the noise of the files that state it; huber loss",
+        "pictures 992 directions a pixel, 0.82 % rms error of a pixel; the fit 495, 1.4 %",
+        "3, of which 2 reached this minimum",
+        "0.001 +/- unknown  (start 0.3, at its lower bound, not identifiable)",
+        "50.0 +/- 3.1 um  (start 10)",
+        "[0.100, 0.200, 0.3] +/- [0.010, 0.020, unknown]  (= absorption_per_mm * thickness_um)",
+        "C(coat.alpha, coat.tau[0]) = -0.970",
+        "can change together without changing the image",
+        "was held at its start",
+        "max not finite, p99.9 2.0e-06 relative: FAILURE",
+        "worst value: g at pixel x 3, y 4: shader not finite, JAX 0.25",
+        "2.00 s in all: import 0.50 s (25 %), solve 1.50 s (75 %)",
+    ],
+)
+def test_the_report_says(said):
+    assert said in "\n".join(lines(DOCUMENT))
+
+
+@pytest.mark.parametrize(
+    ("weighting", "said"),
+    [
+        ({"kind": "uniform", "loss": "square"}, "weights:     the same for every pixel\n"),
+        ({"noise": [True], "loss": "square"}, "and the noise that the file states\n"),
+        ({"noise": [False], "loss": "square"}, "; no file states its noise\n"),
+    ],
+)
+def test_weights_in_words(weighting, said):
+    document = DOCUMENT | {"weighting": DOCUMENT["weighting"] | weighting}
+    assert said in "\n".join(lines(document))
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "said"),
+    [
+        (0.120539, 0.0001347, ("0.12054", "0.00013")),
+        (0.1041, 0.00198, ("0.1041", "0.0020")),
+        (0.3, 2.9e-8, ("0.3000000", "2.9e-08")),  # no more digits than float32 has
+        (123.4, 12.0, ("123", "12")),
+        (1e-4, 2.0, ("0.0", "2.0")),
+        (0.0, 0.1, ("0", "0.1")),
+        (1.5, None, ("1.5", "unknown")),
+        ([0.1, 0.2], [0.01, None], ("[0.100, 0.2]", "[0.010, unknown]")),
+        ([0.1, 0.2], None, ("[0.1, 0.2]", "[unknown, unknown]")),
+    ],
+)
+def test_digits_follow_from_sigma(value, sigma, said):
+    assert measured(value, sigma) == said
+
+
+def test_what_is_not_finite_is_said():
+    assert relative(None) == "not finite"
+    assert image_error({"rel_l2": None, "psnr_db": None, "ssim": None, "delta_e": None}) == "not finite"
+    assert worst({"wi": [0.0, 0.6, 0.8], "wo": [0.0, 0.0, 1.0], "channel": "b", "shader": 1.0, "jax": 2.0}) == (
+        "b at wi (0.000000, 0.600000, 0.800000), wo (0.000000, 0.000000, 1.000000): shader 1, JAX 2"
+    )
+
+
+def opened(png: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(png))).astype(int)
+
+
+def test_false_colours_grow_brighter():
+    colours = pictures.false_colour(np.linspace(-0.5, 1.5, 101)[None])[0]
+    luminance = colours @ [0.2126, 0.7152, 0.0722]
+    assert np.all(np.diff(luminance) >= 0.0)
+    assert luminance[0] < 0.02
+    assert luminance[-1] > 0.9
+
+
+def test_a_difference_ends_its_scale_at_the_99th_percentile_and_greys_what_is_left_out():
+    reference = np.zeros((10, 10, 3))
+    image = np.zeros((10, 10, 3))
+    image[:, 5:] = 0.02
+    image[0, 0] = np.nan
+    covered = np.ones((10, 10), bool)
+    covered[9] = False
+    panel = pictures.difference(image, reference, 2.0, covered)
+    assert panel.scale == "1 % of white"
+    assert np.ptp(panel.image[9]) == 0.0
+    assert np.all(panel.image[5, 7] > panel.image[5, 2])
+    assert np.all(np.isfinite(panel.image))
+
+
+@pytest.mark.parametrize(("size", "shown"), [((48, 48), 240), ((128, 128), 256), ((400, 400), 400), ((1024, 1024), 512)])
+def test_panels_are_shown_at_a_size_that_can_be_seen(size, shown):
+    grey = pictures.Panel("grey", np.full((*size, 3), 0.5))
+    picture = opened(pictures.strip([[grey]]))
+    rows, columns = np.nonzero(np.all(picture == 128, -1))
+    assert (np.ptp(rows) + 1, np.ptp(columns) + 1) == (shown, shown)
+
+
+def test_rows_of_other_shapes_keep_them():
+    wide, tall = (pictures.Panel("p", np.full((*size, 3), 0.5)) for size in ((64, 128), (128, 64)))
+    picture = opened(pictures.strip([[wide], [tall]]))
+    below = np.all(picture[picture.shape[0] // 2 :] == 128, -1)
+    rows, columns = np.nonzero(below)
+    assert np.ptp(rows) > 1.8 * np.ptp(columns)
+
+
+def test_a_long_caption_stays_over_its_panel():
+    panel = pictures.Panel("a caption that is much too long for the picture below it, and goes on", np.zeros((64, 64, 3)))
+    picture = opened(pictures.strip([[panel, pictures.Panel("", np.zeros((64, 64, 3)))]]))
+    second = picture[8:28, 256 + 2 * 8 :]
+    assert np.ptp(second.reshape(-1, 3), axis=0).max() == 0
+
+
+@pytest.mark.parametrize(
+    "rows", [[(0.1, "coarse", 0, 1.0)], [(0.5, "coarse", 0, 9.0), (0.7, "fine 1", 0, 1e-7), (9.0, "fine 2", 0, 0.0)]]
+)
+def test_convergence_is_drawn_whatever_the_steps(rows):
+    assert opened(pictures.convergence(rows)).shape == (300, 760, 3)
