@@ -1,0 +1,123 @@
+"""A stack as the walk reads it: relative indices, widths and media by the number of their boundary, each colour channel apart."""
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import jax
+import numpy as np
+
+from .._chunk import static, struct
+from .._types import Number, Scalar
+from ..optics.microfacet import Distribution
+from ..stack import Stack
+from ..surfaces.microfacet import Microfacets
+from ._facets import Widths
+
+Interface = Literal["single", "multi"]
+"""What one rough boundary does to light.
+
+`single`: a facet sends it on once and what goes to the wrong side is lost (Walter et al. 2007), with height-correlated masking
+of what is reflected and separable masking of what is refracted: Mitsuba, Cycles and pbrt.
+`multi`: it goes on from facet to facet until it leaves; no energy is lost (Heitz et al. 2016).
+"""
+
+
+@struct
+class Haze:
+    """Scattering in the medium of a coat, beside its absorption.
+
+    `tau` [1] is the optical depth of scattering, one way at normal incidence, the same in every channel: with the optical depth
+    tau_a of the coat's absorption, the single-scattering albedo is tau / (tau + tau_a). `g` in (-1, 1) is the mean cosine of the
+    phase function (Henyey and Greenstein 1941, eq. 2): 0 scatters evenly, positive values forwards.
+    """
+
+    tau: Number
+    g: Number = 0.0
+
+
+@struct
+class Boundary:
+    """One rough interface: `eta` is the index below over the index above."""
+
+    eta: Scalar
+    widths: Widths
+    kind: Distribution = static()
+    separable: bool = static()
+
+
+@struct
+class Medium:
+    """What lies below one interface: `tau` of absorption by channel, or None; `haze`, or None."""
+
+    tau: tuple[Scalar, ...] | None
+    haze: Haze | None
+
+
+@struct
+class Material:
+    """Interfaces from the top, the medium below each, and the base by channel, relative to the medium above it."""
+
+    boundaries: tuple[Boundary, ...]
+    media: tuple[Medium, ...]
+    base: tuple[Any, ...]
+    interface: Interface = static()
+
+
+def read(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> Material:
+    """The material of every row: numbers of the stack have shape (rows,) or, where they are colours, (rows, 3)."""
+    check(stack, interface, haze)
+    colour = any(np.ndim(x) > 1 for x in jax.tree.leaves(stack))
+    channels = [_channel(stack, k) for k in range(3 if colour else 1)]
+    boundaries: list[Boundary] = []
+    media: list[Medium] = []
+    above = np.ones(1, np.float32)
+    for k, coat in enumerate(channels[0].layers):
+        depths: list[Any] = [channel.layers[k].optical_depth for channel in channels]
+        tau = None if depths[0] is None else tuple(depths)
+        scatter = haze.get(coat.name)
+        if boundaries and np.all(coat.eta == above):
+            # No boundary is left between media of one index, not even one that masks: their depths add.
+            if scatter or media[-1].haze:
+                raise ValueError(f"haze in layers of equal index ({coat.name!r} and the one above): give one layer all of it")
+            media[-1] = Medium(_sum(media[-1].tau, tau), None)
+            continue
+        kind = coat.distribution
+        boundaries.append(Boundary(coat.eta / above, widths(coat), kind, coat.masking == "smith_separable"))
+        media.append(Medium(tau, scatter))
+        above = coat.eta
+    return Material(tuple(boundaries), tuple(media), tuple(channel.base.below(above) for channel in channels), interface)
+
+
+def widths(surface: Microfacets) -> Widths:
+    """(alpha_x, alpha_y), equal on an isotropic surface."""
+    return surface.width if isinstance(surface.width, tuple) else (surface.width, surface.width)
+
+
+def check(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
+    """Refuse what cannot be walked through, and say what to do instead."""
+    if interface not in ("single", "multi"):
+        raise ValueError(f"no interface model {interface!r}: 'single' or 'multi'")
+    if not stack.layers:
+        raise ValueError("no coat to walk through: the base alone is its own closed form, stack.base.evaluate(wi, wo)")
+    for coat in stack.layers:
+        if coat.masking == "vcavity":
+            raise ValueError(f"coat {coat.name!r} has V-cavities, which say nothing of refracted light: set masking='smith'")
+        if np.ndim(coat.eta) > 1:
+            raise ValueError(f"coat {coat.name!r} has an index for every channel; a path has one direction: walk by channel")
+    if np.any(stack.layers[0].eta == 1.0):
+        raise ValueError(
+            "the top coat has the index of air, so no interface: leave it out, multiply by exp(-tau (1/NoL + 1/NoV))"
+        )
+    unknown = set(haze) - {coat.name for coat in stack.layers}
+    if unknown:
+        raise KeyError(f"haze in {sorted(unknown)}, which are no coats; there are {[coat.name for coat in stack.layers]}")
+
+
+def _channel(stack: Stack, k: int) -> Stack:
+    return jax.tree.map(lambda x: x[:, k] if np.ndim(x) > 1 else x, stack)
+
+
+def _sum(a: Any, b: Any) -> Any:
+    if a is None or b is None:
+        return b if a is None else a
+    return tuple(x + y for x, y in zip(a, b, strict=True))
