@@ -1,6 +1,7 @@
 """The commands as users run them: what they write, what they print, and how they end."""
 
 import csv
+import importlib
 import io
 import json
 import math
@@ -274,8 +275,9 @@ def test_a_shader_that_is_not_the_material_is_a_finding(scene, gl, tmp_path, mon
 
 
 def test_a_fit_that_does_not_converge_is_a_finding(scene, gl, tmp_path, monkeypatch):
-    monkeypatch.setattr("layerfit.fit.fit.FINE_STEPS", 1)
-    monkeypatch.setattr("layerfit.fit.fit.COARSE_STEPS", 1)
+    solver = importlib.import_module("layerfit.fit.fit")
+    monkeypatch.setattr(solver, "FINE_STEPS", 1)
+    monkeypatch.setattr(solver, "COARSE_STEPS", 1)
     ran = layerfit("fit", scene, "-o", tmp_path, "--starts", "1", "--json")
     assert ran.code == 1, ran.err
     document = json.loads(ran.out)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ._data import shaders
 from ._fields import Param, params
 from .documents import check_keys, nearest, read_document, write_text
 from .errors import InputError
@@ -29,8 +30,12 @@ _STACK_KEYS = ("model", "options", "layers", "base")
 _PRESET_KEYS = ("schema", "version", "name", *_STACK_KEYS, "left_out", "fit")
 
 
-def read_preset(path: Path) -> Stack:
-    """The material of a preset file. Raises `InputError` that says which key is wrong and what was meant."""
+def read_preset(path: Path | str) -> Stack:
+    """The material of a preset file, or of a shipped preset by its bare name, such as "lacquered_copper".
+
+    Raises `InputError` that says which key is wrong and what was meant.
+    """
+    path = _shipped(Path(path))
     document = read_document(path)
     where = str(path)
     if document.get("schema") != SCHEMA:
@@ -42,6 +47,20 @@ def read_preset(path: Path) -> Stack:
         )
     check_keys(document, _PRESET_KEYS, where)
     return stack_of({key: document[key] for key in _STACK_KEYS if key in document}, where)
+
+
+def _shipped(path: Path) -> Path:
+    """Where a preset is: a name without an ending that is no file here may be that of a shipped one."""
+    if path.suffix or path.exists():
+        return path
+    folder = shaders() / "presets"
+    names = sorted(file.stem for file in folder.glob("*.json"))
+    if path.name not in names:
+        raise InputError(
+            f"{path}: there is no such file, and no shipped preset of that name{nearest(path.name, names)}. "
+            f"Shipped are {', '.join(names)}."
+        )
+    return folder / f"{path.name}.json"
 
 
 def preset_of(stack: Stack, name: str, **more: Any) -> dict[str, Any]:
@@ -60,9 +79,9 @@ def preset_of(stack: Stack, name: str, **more: Any) -> dict[str, Any]:
     return document | more
 
 
-def write_preset(path: Path, stack: Stack, name: str, **more: Any) -> None:
-    """Write a preset file, whole or not at all."""
-    write_text(path, json.dumps(preset_of(stack, name, **more), indent=2) + "\n")
+def write_preset(path: Path | str, stack: Stack, name: str, **more: Any) -> None:
+    """Write a preset file, whole or not at all; `more` are further keys, such as `fit`."""
+    write_text(Path(path), json.dumps(preset_of(stack, name, **more), indent=2) + "\n")
 
 
 def model_name(stack: Stack) -> str:

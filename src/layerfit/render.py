@@ -15,7 +15,11 @@ from .stack import Stack, evaluate
 def radiance(
     stack: Stack, wi: Float[Array, "n s 3"], wo: Float[Array, "n 3"], weight: Float[Array, "n s 3"]
 ) -> Float[Array, "n 3"]:
-    """Radiance of pixels: directions in their surface frames, `weight` what each direction brings per unit of BRDF."""
+    """Linear radiance (n, 3) of n pixels with s light samples each; traced, for JAX to differentiate or compile.
+
+    `wi` (n, s, 3) and `wo` (n, 3) are unit directions in the surface frame of each pixel; `weight` (n, s, 3) is what each light
+    sample brings per unit of BRDF: irradiance times cosine for a distant light.
+    """
     prepared = _prepare(stack)
     return jax.vmap(lambda wi, wo, weight: _pixel(stack.form, prepared, wi, wo, weight))(wi, wo, weight)
 
@@ -42,7 +46,11 @@ def block_size(lights: int) -> int:
 
 
 def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """`radiance` of any number of pixels in float32, block by block: one executable a material and number of light samples."""
+    """Linear radiance (n, 3) of any number of pixels, computed in float32 and block by block.
+
+    `wi` and `weight` are (n, s, 3) for s light samples a pixel, `wo` is (n, 3), as in `radiance`. Materials of the same structure
+    share one executable for each s.
+    """
     size = block_size(wi.shape[1])
     stack = stack.astype(np.float32)
     rows = []
@@ -60,6 +68,6 @@ def _padded(a: np.ndarray, size: int) -> np.ndarray:
 
 
 def brdf(stack: Stack, wi: Float[Array, "n 3"], wo: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-    """BRDF [1/sr] of pairs of unit directions in the surface frame, without the cosine."""
+    """BRDF (n, 3) [1/sr] of pairs of unit directions in the surface frame, `wi` (n, 3) and `wo` (n, 3); without the cosine."""
     prepared = stack.prepare()
     return jax.vmap(lambda i, o: jnp.broadcast_to(evaluate(stack.form, prepared, i, o), (3,)))(wi, wo)

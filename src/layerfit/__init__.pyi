@@ -1,0 +1,27 @@
+# The public names, and where each is found. Read at run time too: it is the list that names are loaded by.
+
+from .cache import use_compilation_cache as use_compilation_cache
+from .capture.inspect import inspect as inspect
+from .capture.samples import Samples as Samples, View as View, load as load
+from .capture.scene import Scene as Scene, read_scene as read_scene
+from .errors import InputError as InputError, LayerfitError as LayerfitError, MachineError as MachineError
+from .fit.fit import FitResult as FitResult, fit as fit
+from .fit.metrics import image_error as image_error
+from .fit.result import parameters as parameters
+from .forms.corrected import Corrected as Corrected
+from .forms.faithful import Faithful as Faithful
+from .job import fit_scene as fit_scene
+from .layers import Coat as Coat
+from .preset import read_preset as read_preset, write_preset as write_preset
+from .render import brdf as brdf, predict as predict, radiance as radiance
+from .shader.export import Shader as Shader, print_material as print_material
+from .shader.verify import (
+    Parity as Parity,
+    check_image as check_image,
+    check_pairs as check_pairs,
+    shade_samples as shade_samples,
+)
+from .stack import Stack as Stack
+from .surfaces import Conductor as Conductor, Dielectric as Dielectric, Lambert as Lambert, OrenNayar as OrenNayar
+
+__version__: str
