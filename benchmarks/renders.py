@@ -27,7 +27,7 @@ class Render:
 def renders(folder: Path, scratch: Path, model: str | None = None) -> Iterator[Render]:
     """Every render in a folder; scenes that have to be made are written to `scratch`. `model` replaces the default one."""
     for path in sorted(folder.glob("*.truth.json")):
-        truth = json.loads(path.read_text())["material"]
+        truth = json.loads(path.read_text()).get("material", {})  # of Blender's material, no slab is known
         yield Render(
             path.name.removesuffix(".truth.json"),
             read_scene(path.with_name(path.name.replace(".truth.json", ".toml"))),
