@@ -158,8 +158,7 @@ def test_index_matched_coat_changes_nothing() -> None:
     assert a.mean == pytest.approx(b.mean, rel=0.03)
 
 
-@pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
-@pytest.mark.parametrize("interface", ["single", "multi"])
+@pytest.mark.parametrize(("distribution", "interface"), [("ggx", "single"), ("beckmann", "multi")])
 def test_equal_widths_are_isotropic(distribution: Any, interface: Any) -> None:
     wi, wo = direction(40.0), [direction(30.0, 150.0), direction(70.0, 20.0)]
     round_, square = (

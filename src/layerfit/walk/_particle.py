@@ -52,9 +52,9 @@ class Particle:
     """The state of one lane.
 
     `w`: where the particle comes from, in the frame of the side it is on (in haze: the upper side); `above`: whether that is the
-    upper side of boundary `at`; `c`: its height within the boundary, 1 on arrival (`multi` only); `haze`: whether it
-    is within the medium above boundary `at`, and how deep, 1 being on the boundary. `flux` is, for the eye's half, radiance that passes. `others`: as in
-    `Exit`, over the ways to connect further down, of flux that came from below; 0 of other flux.
+    upper side of boundary `at`; `c`: its height within the boundary, 1 on arrival (`multi` only); `haze`: whether it is within
+    the medium above boundary `at`, and how deep, 1 being on the boundary. `flux` is, for the eye's half, radiance that passes.
+    `others`: as in `Exit`, over the ways to connect further down, of flux that came from below; 0 of other flux.
     """
 
     path: Bits
@@ -203,7 +203,7 @@ def _go_on(material: Material, wi: Direction, p: Particle, happened: Event, u: U
         at=jnp.where(leaves, jnp.where(upwards, medium - 1, medium), p.at),
         above=upwards ^ leaves,
         w=where(leaves, arriving, opposite(d)),
-        c=None if p.c is None else jnp.where(leaves, 1.0, happened.c),
+        c=None if happened.c is None else jnp.where(leaves, 1.0, happened.c),
         others=jnp.where(leaves, jnp.where(upwards, rising, 0.0), p.others),
         exits=exits,
     )
