@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import layerfit
@@ -90,3 +91,17 @@ def test_a_function_of_arrays_states_their_shapes(name):
 def test_units_of_reflectance_and_layers_are_stated():
     assert "1/sr" in (inspect.getdoc(layerfit.brdf) or "")
     assert "1/sr" in (inspect.getdoc(layerfit) or "")
+
+
+def test_the_package_tells_of_every_name():
+    told = set(re.findall(r"\w+", inspect.getdoc(layerfit) or ""))
+    assert not NAMES.keys() - told
+
+
+def test_a_brdf_of_plain_numbers():
+    """A stack as a user writes it, and directions as whole numbers."""
+    stack = layerfit.Stack((layerfit.Coat(tau=0.2),), layerfit.Lambert(albedo=0.5))
+    up = np.array([[0, 0, 1]])
+    value = np.asarray(layerfit.brdf(stack, up, up))
+    np.testing.assert_allclose(value, layerfit.brdf(stack, up.astype(float), up.astype(float)), rtol=1e-5)
+    assert np.all(value > 0.0)

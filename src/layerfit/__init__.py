@@ -1,6 +1,13 @@
 """Fit layered materials to reference renders, and print them as shaders.
 
-Names are loaded when they are first used (see `__init__.pyi` for all of them): importing the package costs nothing.
+- Materials: Stack of Coat over Conductor, Dielectric, Lambert or OrenNayar, in the form Corrected or Faithful; read_preset, write_preset.
+- References: read_scene gives a Scene, load its View of each reference, from which Samples are drawn; inspect says what an EXR holds.
+- Fitting: fit gives a FitResult, parameters its values with sigmas; fit_scene does what `layerfit fit` does; image_error compares pictures.
+- Rendering: predict gives pixels, radiance the same traced, brdf the plain function.
+- Shaders: print_material gives a Shader; shade_samples draws it; check_pairs and check_image compare it with JAX and give a Parity.
+- The machine: use_compilation_cache. Faults: InputError and MachineError, each a LayerfitError.
+
+Names are loaded when they are first used: importing the package costs nothing. `__init__.pyi` says where each is found.
 
 Conventions throughout. Directions `wi` (to the light) and `wo` (to the viewer) are unit vectors that point away from the surface, in
 its frame: tangent, bitangent, normal (0, 0, 1). A BRDF is in 1/sr and holds no cosine. Colours are linear Rec.709.

@@ -1,6 +1,6 @@
 """What a field of a layer says about itself: range, unit, default, scale and meaning, written once.
 
-Fit bounds, preset keys, command-line overrides, shader comments and the manual's tables are derived from these fields.
+Fit bounds, preset keys, shader comments and the manual's tables are derived from these fields.
 """
 
 import dataclasses

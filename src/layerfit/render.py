@@ -69,5 +69,8 @@ def _padded(a: np.ndarray, size: int) -> np.ndarray:
 
 def brdf(stack: Stack, wi: Float[Array, "n 3"], wo: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
     """BRDF (n, 3) [1/sr] of pairs of unit directions in the surface frame, `wi` (n, 3) and `wo` (n, 3); without the cosine."""
+    dtype = jnp.result_type(jnp.float32, wi, wo)
+    stack = stack.astype(dtype)
     prepared = stack.prepare()
+    wi, wo = (jnp.asarray(w, dtype) for w in (wi, wo))
     return jax.vmap(lambda i, o: jnp.broadcast_to(evaluate(stack.form, prepared, i, o), (3,)))(wi, wo)
