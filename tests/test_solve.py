@@ -9,18 +9,18 @@ import pytest
 from scipy.optimize import least_squares
 
 from layerfit.fit.residuals import initial
-from layerfit.fit.solve import NormalLevenbergMarquardt, normal_equations, products
+from layerfit.fit.solve import NormalLevenbergMarquardt, columns, normal_equations, products
 from layerfit.fit.uncertainty import estimate
 
 SLOTS = ((0,), (1, 2, 3), (4,))
 RNG = np.random.default_rng(1)
-X = RNG.uniform(0.1, 2.0, (200, 1))
+X = RNG.uniform(0.1, 2.0, 200)
 
 
 def model(fields):
-    """Channel c sees channel c of the colour, and both scalars."""
+    """Channels first; channel c sees channel c of the colour, and both scalars."""
     width, colour, level = fields
-    return colour * jnp.exp(-((X / width) ** 2)) + level**2 * X
+    return colour[:, None] * jnp.exp(-((X / width) ** 2)) + level**2 * X
 
 
 def fields(u):
@@ -28,9 +28,7 @@ def fields(u):
 
 
 TRUTH = np.array([0.7, 0.5, 1.0, 2.0, 0.3])
-TARGET = np.asarray(model(fields(jnp.asarray(TRUTH)))) + 0.01 * RNG.normal(size=(200, 3))
-
-
+TARGET = np.asarray(model(fields(jnp.asarray(TRUTH)))) + 0.01 * RNG.normal(size=(3, 200))
 SOLVER = NormalLevenbergMarquardt()
 
 
@@ -39,9 +37,14 @@ def residual(f, target=TARGET):
 
 
 @partial(jax.jit, static_argnames="residual")
-def step(y, state, bounds, target, residual):
-    fn = lambda u, target: normal_equations(products(lambda f: residual(f, target), fields(u)), SLOTS)  # noqa: E731
-    return SOLVER.step(fn, y, target, dict(zip(("lower", "upper"), bounds, strict=True)), state, frozenset())[:2]
+def jacobian(u, target, residual):
+    return columns(lambda f: residual(f, target), fields(u))
+
+
+@jax.jit
+def advance(y, state, bounds, total):
+    fn = lambda u, args: normal_equations(total, SLOTS)  # noqa: E731
+    return SOLVER.step(fn, y, None, {"lower": bounds[0], "upper": bounds[1]}, state, frozenset())[:2]
 
 
 def minimise(start, lower=-np.inf, upper=np.inf, target=TARGET, residual=residual):
@@ -49,7 +52,8 @@ def minimise(start, lower=-np.inf, upper=np.inf, target=TARGET, residual=residua
     state = initial(y, SOLVER)
     path = []
     for _ in range(200):
-        y, state = step(y, state, (np.full(5, lower), np.full(5, upper)), target, residual)
+        total = products(jacobian(state.y_eval, target, residual))
+        y, state = advance(y, state, (np.full(5, lower), np.full(5, upper)), total)
         path.append(np.asarray(y))
         if state.done:
             break
@@ -59,19 +63,19 @@ def minimise(start, lower=-np.inf, upper=np.inf, target=TARGET, residual=residua
 def test_normal_equations_are_those_of_the_dense_jacobian():
     u = jnp.array([0.6, 0.4, 0.9, 1.5, 0.5])
     r = np.asarray(residual(fields(u))).ravel()
-    jacobian = np.asarray(jax.jacfwd(lambda u: residual(fields(u)).ravel())(u))
-    loss, (gradient, gram) = normal_equations(products(residual, fields(u)), SLOTS)
+    dense = np.asarray(jax.jacfwd(lambda u: residual(fields(u)).ravel())(u))
+    loss, (gradient, gram) = normal_equations(products(columns(residual, fields(u))), SLOTS)
     np.testing.assert_allclose(loss, 0.5 * r @ r, rtol=1e-13)
-    np.testing.assert_allclose(gradient, jacobian.T @ r, rtol=1e-12)
-    np.testing.assert_allclose(gram, jacobian.T @ jacobian, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(gradient, dense.T @ r, rtol=1e-12)
+    np.testing.assert_allclose(gram, dense.T @ dense, rtol=1e-12, atol=1e-12)
 
 
 def test_sums_of_float32_residuals_are_float64():
     u = jnp.array([0.6, 0.4, 0.9, 1.5, 0.5])
     narrow = [f.astype(np.float32) for f in fields(u)]
-    sums = products(lambda f: residual(f).astype(np.float32), narrow)
+    sums = products(columns(lambda f: residual(f).astype(np.float32), narrow))
     assert sums.dtype == np.float64
-    np.testing.assert_allclose(sums, products(residual, fields(u)), rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(sums, products(columns(residual, fields(u))), rtol=1e-5, atol=1e-5)
 
 
 @pytest.mark.parametrize("start", [[0.3, 1.0, 1.0, 1.0, 1.0], [2.0, 0.1, 0.1, 0.1, 0.01]])
@@ -110,17 +114,15 @@ def test_a_trial_that_is_not_finite_is_stepped_back_from():
 
 
 def test_sigmas_are_the_scatter_of_repeated_fits():
-    @jax.jit
-    def part(u, target, weight):
-        return normal_equations(products(lambda f: residual(f, target) * weight[:, None], fields(u)), SLOTS)[1]
-
     truth = np.asarray(model(fields(jnp.asarray(TRUTH))))
     groups = np.arange(200) % 12 == np.arange(12)[:, None]
     found, sigmas = [], []
     for seed in range(60):
         target = truth + 0.02 * np.random.default_rng(seed).normal(size=truth.shape)
         u, state, _ = minimise(TRUTH, target=target)
-        parts = [tuple(map(np.asarray, part(u, target, group.astype(float)))) for group in groups]
+        rows = jacobian(u, target, residual)
+        parts = [normal_equations(products([row * group for row in rows]), SLOTS)[1] for group in groups]
+        parts = [tuple(map(np.asarray, part)) for part in parts]
         found.append(u)
         sigmas.append(estimate(np.asarray(state.gram), float(state.loss), target.size, np.zeros(5, bool), parts).sigma)
     # The larger of two estimates: never below the scatter, above it by what a maximum of two is.

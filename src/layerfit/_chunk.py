@@ -8,6 +8,7 @@ operation clamped to the domain, which is what a shader needs; its derivative is
 
 import dataclasses
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeVar, cast, dataclass_transform
 
 import jax
@@ -48,6 +49,12 @@ def struct(cls: type[T]) -> type[T]:
     return jax.tree_util.register_dataclass(made, [f.name for f in fields if f.name not in meta], meta)
 
 
+@jax.jit
+def dot(a: jax.Array, b: jax.Array) -> jax.Array:
+    """Dot product of two 3-vectors, GLSL's `dot`. Written out: for `jnp.dot` the compiler calls a library, for three products."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def _tiny(x: jax.Array) -> float:
     """The smallest number whose reciprocal square root is still harmless in the precision of `x`."""
     return 1e-14 if x.dtype == np.float32 else 1e-30
@@ -82,6 +89,16 @@ def _(primals: Any, tangents: Any) -> Any:
     return quotient, jnp.where(inside, (dx - quotient * dy) * inverse, 0.0)
 
 
+@partial(jax.custom_jvp, nondiff_argnums=(1,))
 def safe_power(x: jax.Array, exponent: float) -> jax.Array:
-    """x ** exponent for x >= 0 and a constant exponent > 1; value and derivative 0 at and below 0."""
+    """x ** exponent for x >= 0 and a constant exponent > 0; value and derivative 0 at and below 0."""
     return jnp.power(jnp.maximum(x, 1e-30), exponent)
+
+
+@safe_power.defjvp
+def _(exponent: float, primals: Any, tangents: Any) -> Any:
+    (x,), (dx,) = primals, tangents
+    y = safe_power(x, exponent)
+    inside = x > 1e-30
+    # From the power itself, not by another one: powers are what a step of a fit takes longest for.
+    return y, jnp.where(inside, exponent * y / jnp.where(inside, x, 1.0), 0.0) * dx

@@ -21,6 +21,10 @@ class Clock:
 
 CLOCK = Clock()
 
+OPTIONS = {"xla_disable_hlo_passes": "call-inliner"}
+"""Shading functions stay functions: inlined, they are fused to loops of a thousand operations, which LLVM no longer vectorises (two
+to four times slower)."""
+
 
 class Compiled:
     """A traced function with one executable for each structure and size of its arguments, made when it is first called."""
@@ -36,7 +40,7 @@ class Compiled:
             start = time.perf_counter()
             lowered = self._jit.trace(*args, **static).lower()
             traced = time.perf_counter()
-            self._executables[key] = lowered.compile()
+            self._executables[key] = lowered.compile(compiler_options=OPTIONS)
             CLOCK.trace_s += traced - start
             CLOCK.compile_s += time.perf_counter() - traced
-        return jax.block_until_ready(self._executables[key](*args))
+        return self._executables[key](*args)

@@ -13,13 +13,19 @@ from .stack import Stack, evaluate
 
 
 def radiance(
-    stack: Stack, wi: Float[Array, "n s 3"], wo: Float[Array, "n 3"], weight: Float[Array, "n s 3"]
-) -> Float[Array, "n 3"]:
-    """Linear radiance (n, 3) of n pixels with s light samples each; traced, for JAX to differentiate or compile.
+    stack: Stack, wi: Float[Array, "n s 3"], wo: Float[Array, "n 3"], weight: Float[Array, "3 n s"]
+) -> Float[Array, "3 n"]:
+    """Linear radiance (3, n) of n pixels with s light samples each; traced, for JAX to differentiate or compile.
 
-    `wi` (n, s, 3) and `wo` (n, 3) are unit directions in the surface frame of each pixel; `weight` (n, s, 3) is what each light
-    sample brings per unit of BRDF: irradiance times cosine for a distant light.
+    `wi` (n, s, 3) and `wo` (n, 3) are unit directions in the surface frame of each pixel; `weight` (3, n, s) is what each light
+    sample brings per unit of BRDF: irradiance times cosine for a distant light. Channels come first, in and out: none depends on
+    another, what they share is computed once, and the loops of the compiled code run over pixels.
     """
+    colours = jax.tree.map(lambda value: 0 if value.ndim else None, stack)
+    return jax.vmap(_channel, in_axes=(colours, None, None, 0))(stack, wi, wo, weight)
+
+
+def _channel(stack: Stack, wi: Any, wo: Any, weight: Any) -> Any:
     prepared = _prepare(stack)
     return jax.vmap(lambda wi, wo, weight: _pixel(stack.form, prepared, wi, wo, weight))(wi, wo, weight)
 
@@ -30,14 +36,13 @@ _prepare = jax.jit(Stack.prepare)
 
 @partial(jax.jit, static_argnames="form")
 def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any) -> Any:
-    if wi.shape[0] == 1:
+    if wi.shape[0] == 1:  # one light needs no axis: the compiler would carry it through every intermediate value
         return evaluate(form, prepared, wi[0], wo) * weight[0]
-    f = jax.vmap(lambda w: jnp.broadcast_to(evaluate(form, prepared, w, wo), (3,)))(wi)
-    return jnp.sum(f * weight, 0)
+    return jnp.sum(jax.vmap(lambda w: evaluate(form, prepared, w, wo))(wi) * weight)
 
 
 _compiled = Compiled(radiance)
-_BLOCK = 4096
+_BLOCK = 1024
 
 
 def block_size(lights: int) -> int:
@@ -48,7 +53,7 @@ def block_size(lights: int) -> int:
 def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Linear radiance (n, 3) of any number of pixels, computed in float32 and block by block.
 
-    `wi` and `weight` are (n, s, 3) for s light samples a pixel, `wo` is (n, 3), as in `radiance`. Materials of the same structure
+    `wi` and `weight` are (n, s, 3) for s light samples a pixel, `wo` is (n, 3), and `weight` has its channels last. Materials of the same structure
     share one executable for each s.
     """
     size = block_size(wi.shape[1])
@@ -56,8 +61,9 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) ->
     rows = []
     with jax.enable_x64(False):
         for start in range(0, len(wo), size):
-            block = [_padded(a[start : start + size], size) for a in (wi, wo, weight)]
-            rows.append(np.asarray(_compiled(stack, *block)))
+            part = [_padded(a[start : start + size], size) for a in (wi, wo, weight)]
+            part[2] = np.moveaxis(part[2], -1, 0)
+            rows.append(np.asarray(_compiled(stack, *part)).T)
     return np.concatenate(rows)[: len(wo)]
 
 

@@ -1,13 +1,14 @@
 """Samples of all references as equal blocks of pixels: one compiled step serves a thousand pixels and a million.
 
 Pixels are dealt to the blocks in an order stratified by half angle, so that the first blocks are a fair sample of the image:
-a fit starts on one block and ends on all of them, by a count, without compiling again. Blocks are padded with pixels of weight 0.
+a fit starts on one block and ends on all of them. Blocks are padded with pixels of weight 0.
 """
 
 import dataclasses
-from typing import Any
 
+import jax
 import numpy as np
+from jaxtyping import Array, Float
 
 from .._chunk import struct
 from ..capture.samples import Samples
@@ -15,20 +16,16 @@ from ..render import block_size
 
 
 @struct
-class Blocks:
-    """Arrays of (blocks, pixels, ...): directions, weights, targets, residual weights, and thickness scales a block."""
+class Block:
+    """Pixels of one reference, channels first where there are any."""
 
-    wi: Any
-    wo: Any
-    weight: Any
-    target: Any
-    inverse_sigma: Any
-    scale: Any
-    """(blocks, layers): thickness over that of the material; absent where it is 1 everywhere."""
-
-    @property
-    def count(self) -> int:
-        return self.wo.shape[0]
+    wi: Float[Array, "n s 3"]
+    wo: Float[Array, "n 3"]
+    weight: Float[Array, "3 n s"]
+    target: Float[Array, "3 n"]
+    inverse_sigma: Float[Array, "3 n"]
+    scale: Float[Array, " layers"] | None
+    """Thickness over that of the material; absent where it is 1 everywhere."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,27 +34,15 @@ class Layout:
 
     reference: np.ndarray
     pixel: np.ndarray
-    used: int
-    """Blocks that hold pixels; the rest only rounds the number up."""
 
     def scatter(self, values: list[np.ndarray], fill: float) -> np.ndarray:
-        """Values (pixels, ...) a reference as blocks."""
+        """Values (pixels, ...) a reference as (blocks, pixels, ...)."""
         shape = (*self.pixel.shape, *values[0].shape[1:])
         out = np.full(shape, fill, np.float32)
         for k, value in enumerate(values):
             at = self.reference == k
             out[at] = value[self.pixel[at]]
         return out
-
-    def gather(self, blocks: np.ndarray, sizes: list[int]) -> list[np.ndarray]:
-        """Blocks as values (pixels, ...) a reference."""
-        values = []
-        for k, size in enumerate(sizes):
-            at = self.reference == k
-            out = np.zeros((size, *blocks.shape[2:]), blocks.dtype)
-            out[self.pixel[at]] = blocks[at]
-            values.append(out)
-        return values
 
 
 def stratified(samples: Samples, seed: int) -> np.ndarray:
@@ -79,7 +64,7 @@ def stratified(samples: Samples, seed: int) -> np.ndarray:
     return np.argsort(key)
 
 
-def arrange(references: list[Samples], scales: np.ndarray | None, seed: int) -> tuple[Blocks, Layout]:
+def arrange(references: list[Samples], scales: np.ndarray | None, seed: int) -> tuple[list[Block], Layout]:
     """Blocks of all references; `scales` (references, layers) or None. The references take turns, block by block."""
     lights = max(s.wi.shape[1] for s in references)
     longest = max(len(s.index) for s in references)
@@ -91,13 +76,12 @@ def arrange(references: list[Samples], scales: np.ndarray | None, seed: int) -> 
     # Sorted by place within their reference: the first blocks hold some of each.
     place = [sum(other == k for other, _ in rows[:i]) for i, (k, _) in enumerate(rows)]
     rows = [rows[i] for i in np.argsort(place, kind="stable")]
-    count = 2 ** (len(rows) - 1).bit_length()
-    reference = np.full((count, size), -1)
-    pixel = np.full((count, size), -1)
+    reference = np.full((len(rows), size), -1)
+    pixel = np.full((len(rows), size), -1)
     for b, (k, members) in enumerate(rows):
         reference[b, : len(members)] = k
         pixel[b, : len(members)] = members
-    layout = Layout(reference, pixel, len(rows))
+    layout = Layout(reference, pixel)
     up = np.array([0.0, 0.0, 1.0], np.float32)
 
     def padded(field: str, samples: Samples) -> np.ndarray:
@@ -110,15 +94,22 @@ def arrange(references: list[Samples], scales: np.ndarray | None, seed: int) -> 
     empty = pixel < 0
     wi[empty] = up
     wo[empty] = up
-    blocks = Blocks(
-        wi=wi,
-        wo=wo,
-        weight=layout.scatter([padded("weight", s) for s in references], 0.0),
-        target=layout.scatter([s.target for s in references], 0.0),
-        inverse_sigma=layout.scatter([np.ones_like(s.target) for s in references], 0.0),
-        scale=None if scales is None else scales[np.maximum(reference[:, 0], 0)].astype(np.float32),
-    )
+    weight = channels_first(layout.scatter([padded("weight", s) for s in references], 0.0))
+    target = channels_first(layout.scatter([s.target for s in references], 0.0))
+    blocks = [
+        jax.device_put(Block(wi[b], wo[b], weight[b], target[b], np.zeros_like(target[b]), _scale(scales, k)))
+        for b, (k, _) in enumerate(rows)
+    ]
     return blocks, layout
+
+
+def channels_first(values: np.ndarray) -> np.ndarray:
+    """(blocks, pixels, ..., channels) as (blocks, channels, pixels, ...)."""
+    return np.ascontiguousarray(np.moveaxis(values, -1, 1))
+
+
+def _scale(scales: np.ndarray | None, reference: int) -> np.ndarray | None:
+    return None if scales is None else scales[reference].astype(np.float32)
 
 
 def _power_of_two(n: int) -> int:

@@ -13,9 +13,9 @@ from ..capture.samples import QUADRATURE, Samples, View
 from ..errors import InputError
 from ..render import predict
 from ..stack import Stack
-from .blocks import Blocks, arrange
+from .blocks import Block, arrange, channels_first
 from .parameters import Parametrisation, parametrise, with_fixed
-from .residuals import initial, scaled, step
+from .residuals import NEAR, initial, scaled, step
 from .solve import NormalLevenbergMarquardt
 from .uncertainty import GROUPS, Uncertainty, estimate
 from .weights import inverse_sigma, robust
@@ -28,6 +28,9 @@ EVALUATIONS = 250_000
 
 DIRECTIONS = QUADRATURE // 2
 """Light samples a pixel of a quadrature: its error is drawn anew for each pixel, so that few hundred of them average it out."""
+
+COARSE_BLOCKS = 2
+"""Blocks of pixels for the search, and at least one of each reference: enough to tell minima apart."""
 
 COARSE_STEPS = 12
 FINE_STEPS = 60
@@ -145,7 +148,7 @@ class _Fit:
         u = best.vector
         for k in range(ROUNDS):
             self._weigh(u)
-            u, cost, converged, gram = self._descend(u, self.layout.used, FINE_STEPS, f"fine {k + 1}", best.start)
+            u, cost, converged, gram = self._descend(u, self.blocks, FINE_STEPS, f"fine {k + 1}", best.start)
             self.progress("fine", (k + 1) / ROUNDS)
         held = (u <= self.bounds[0]) | (u >= self.bounds[1])
         uncertainty = estimate(gram, cost, self._residuals(), held, self._parts(u))
@@ -185,9 +188,12 @@ class _Fit:
             if u is not None and self.loss != "square":
                 weight = weight * robust((model - samples.target) * weight, self.loss)
             values.append(weight)
-        weight = self.layout.scatter(values, 0.0)
-        self.brightness = np.sum((weight * np.asarray(self.blocks.target)).astype(float) ** 2, (1, 2))
-        self.blocks = jax.device_put(dataclasses.replace(self.blocks, inverse_sigma=weight))
+        weight = channels_first(self.layout.scatter(values, 0.0))
+        self.brightness = [
+            float(np.sum((w * np.asarray(block.target)).astype(float) ** 2))
+            for w, block in zip(weight, self.blocks, strict=True)
+        ]
+        self.blocks = [_weighted(block, w) for block, w in zip(self.blocks, weight, strict=True)]
 
     def _models(self, u: np.ndarray) -> list[np.ndarray]:
         stack = self._material(u)
@@ -200,16 +206,18 @@ class _Fit:
         stack = self.free.put(self.start, self.free.fields(u), np)
         return jax.tree.map(lambda a: np.asarray(a, np.float32), stack)
 
-    def _step(self, u: Any, state: Any, blocks: Blocks, count: int) -> Any:
-        return step(u, state, self.bounds, self.start, blocks, np.int32(count), free=self.free, solver=self.solver)
+    def _step(self, u: Any, state: Any, blocks: Sequence[Block]) -> Any:
+        return step(u, state, self.bounds, self.start, blocks, free=self.free, solver=self.solver)
 
-    def _descend(self, u: Any, count: int, most: int, stage: str, start: int) -> tuple[np.ndarray, float, bool, np.ndarray]:
-        """Run the solver from `u` on the first `count` blocks; returns the point, its cost, whether it converged, and J^T J."""
+    def _descend(
+        self, u: Any, blocks: Sequence[Block], most: int, stage: str, start: int, trust: float = NEAR
+    ) -> tuple[np.ndarray, float, bool, np.ndarray]:
+        """Run the solver from `u` on some blocks; returns the point, its cost, whether it converged, and J^T J."""
         u = np.asarray(u, float)
-        state = initial(u, self.solver)
-        scale = max(self.brightness[:count].sum(), 1e-30)
+        state = initial(u, self.solver, trust)
+        scale = max(sum(self.brightness[: len(blocks)]), 1e-30)
         for k in range(most):
-            u, state = self._step(u, state, self.blocks, count)
+            u, state = self._step(u, state, blocks)
             error = float(np.sqrt(2.0 * state.loss / scale))
             self.trace.append(Row(time.perf_counter() - self.began, stage, start, k, error))
             if bool(state.done):
@@ -224,7 +232,7 @@ class _Fit:
     def _drop_blind(self, origin: np.ndarray) -> None:
         """Hold what has no effect on these images, with a reason; a parameter that the user asked for by name is an error."""
         at = np.asarray(origin)
-        _, state = self._step(at, initial(at, self.solver), self.blocks, self.layout.used)
+        _, state = self._step(at, initial(at, self.solver), self.blocks)
         if not np.isfinite(float(state.loss)):
             raise InputError(f"{self.where}: the start gives no finite image; choose other values in [material]")
         effect = np.sqrt(np.diag(np.asarray(state.gram)))
@@ -245,15 +253,16 @@ class _Fit:
     def _search(self, origin: np.ndarray) -> list[Minimum]:
         """Minima of the coarse fit, best first: from the given start and from space-filling ones."""
         found = []
+        sample = self.blocks[: max(COARSE_BLOCKS, len(self.views))]
         points = [origin, *_space_filling(self.free, origin, self.starts - 1, self.seed)]
         for k, point in enumerate(points):
-            u, cost, _, _ = self._descend(point, 1, COARSE_STEPS, "coarse", k)
+            u, cost, _, _ = self._descend(point, sample, COARSE_STEPS, "coarse", k, 1.0)
             found.append(Minimum(k, u, cost if np.isfinite(cost) else np.inf))
             self.progress("coarse", (k + 1) / len(points))
         found.sort(key=lambda m: m.cost)
         polished = []
         for minimum in found[:3]:
-            u, cost, _, _ = self._descend(minimum.vector, 1, FINE_STEPS, "polish", minimum.start)
+            u, cost, _, _ = self._descend(minimum.vector, sample, FINE_STEPS, "polish", minimum.start)
             polished.append(Minimum(minimum.start, u, cost))
         return sorted(polished, key=lambda m: m.cost) + found[3:]
 
@@ -263,11 +272,17 @@ class _Fit:
         at = np.asarray(u)
         parts = []
         for g in range(GROUPS):
-            weight = np.where(sector[..., None] == g, self.blocks.inverse_sigma, 0.0)
-            blocks = jax.device_put(dataclasses.replace(self.blocks, inverse_sigma=np.asarray(weight)))
-            _, state = self._step(at, initial(at, self.solver), blocks, self.layout.used)
+            blocks = [
+                _weighted(block, np.where(where == g, block.inverse_sigma, np.float32(0.0)))
+                for block, where in zip(self.blocks, sector, strict=True)
+            ]
+            _, state = self._step(at, initial(at, self.solver), blocks)
             parts.append((np.asarray(state.gradient), np.asarray(state.gram)))
         return parts
+
+
+def _weighted(block: Block, inverse_sigma: np.ndarray) -> Block:
+    return dataclasses.replace(block, inverse_sigma=jax.device_put(inverse_sigma))
 
 
 def _without_gauge(start: Stack, free: Sequence[str] | None) -> tuple[Sequence[str] | None, list[Held]]:

@@ -1,19 +1,20 @@
 """Residuals of a material against blocks of samples, and the compiled step of a fit."""
 
 import dataclasses
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import jax
-import jax.numpy as jnp
+import numpy as np
 
 from .._compiled import Compiled
 from ..layers import Coat
 from ..render import radiance
 from ..stack import Stack
-from .blocks import Blocks
+from .blocks import Block
 from .parameters import Parametrisation
-from .solve import normal_equations, products
+from .solve import columns, normal_equations, products
 
 
 def scaled(stack: Stack, scale: Any) -> Stack:
@@ -30,49 +31,47 @@ def scaled(stack: Stack, scale: Any) -> Stack:
     return dataclasses.replace(stack, layers=layers)
 
 
-def _material(start: Stack, free: Parametrisation, fields: list[Any], block: Blocks) -> Stack:
-    dtype = block.target.dtype
-    stack = free.put(start, [f.astype(dtype) for f in fields]).astype(dtype)
-    return scaled(stack, block.scale)
+def _material(start: Stack, free: Parametrisation, fields: list[Any], block: Block) -> Stack:
+    return scaled(free.put(start, fields).astype(block.target.dtype), block.scale)
 
 
-def _block(blocks: Blocks, k: Any) -> Blocks:
-    return jax.tree.map(lambda a: jax.lax.dynamic_index_in_dim(a, k, keepdims=False), blocks)
+def _columns(u: Any, start: Stack, block: Block, *, free: Parametrisation) -> Any:
+    """The model's derivatives and residual over one block of pixels at `u`, in the precision of the block."""
+
+    def residual(fields: list[Any]) -> Any:
+        model = radiance(_material(start, free, fields, block), block.wi, block.wo, block.weight)
+        return (model - block.target) * block.inverse_sigma
+
+    return columns(residual, free.fields(u))
 
 
-def _normal(u: Any, start: Stack, free: Parametrisation, blocks: Blocks, count: Any) -> Any:
-    """Normal equations over the first `count` blocks."""
-    fields = free.fields(u)
-
-    def of_block(k: Any) -> Any:
-        block = _block(blocks, k)
-
-        def residual(fields: list[Any]) -> Any:
-            model = radiance(_material(start, free, fields, block), block.wi, block.wo, block.weight)
-            return (model - block.target) * block.inverse_sigma
-
-        return products(residual, [f.astype(block.target.dtype) for f in fields])
-
-    columns = len(free.free) + 1
-    zero = jnp.zeros((columns, columns, blocks.target.shape[-1]))
-    total = jax.lax.fori_loop(0, count, lambda k, total: total + of_block(k), zero)
-    return normal_equations(total, tuple(f.slots for f in free.free))
-
-
-def _step(
-    u: Any, state: Any, bounds: Any, start: Stack, blocks: Blocks, count: Any, *, free: Parametrisation, solver: Any
-) -> Any:
-    """One step of the solver from `u`: the new point and the new state."""
-    fn = lambda y, args: _normal(y, start, free, blocks, count)  # noqa: E731
-    options = {"lower": bounds[0], "upper": bounds[1]}
-    u, state, _ = solver.step(fn, u, None, options, state, frozenset())
+def _advance(u: Any, state: Any, bounds: Any, total: Any, *, free: Parametrisation, solver: Any) -> Any:
+    """The solver's new point and state, from the products at its trial point."""
+    fn = lambda y, args: normal_equations(total, tuple(f.slots for f in free.free))  # noqa: E731
+    u, state, _ = solver.step(fn, u, None, {"lower": bounds[0], "upper": bounds[1]}, state, frozenset())
     return u, state
 
 
-step = Compiled(_step, ("free", "solver"))
+_block_columns = Compiled(_columns, ("free",))
+_solver_step = Compiled(_advance, ("free", "solver"))
+
+
+def step(
+    u: Any, state: Any, bounds: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation, solver: Any
+) -> tuple[Any, Any]:
+    """One step of the solver from `u` over some blocks of pixels: the new point and the new state."""
+    trial = np.asarray(state.y_eval).astype(np.float32)
+    # All are started before the first is waited for: what cores there are work side by side.
+    started = [_block_columns(trial, start, block, free=free) for block in blocks]
+    total = np.sum([products(part) for part in started], 0)
+    return _solver_step(u, state, bounds, total, free=free, solver=solver)
+
+
+NEAR = 1e4
+"""Trust in the first step from a point that is near a minimum: nearly that of Gauss and Newton."""
 
 
 @partial(jax.jit, static_argnames="solver")
-def initial(u: Any, solver: Any) -> Any:
-    """State of the solver before its first step at `u`."""
-    return solver.init(None, u, None, {}, None, None, frozenset())
+def initial(u: Any, solver: Any, trust: Any = 1.0) -> Any:
+    """State of the solver before its first step at `u`; `trust` is the inverse of its damping."""
+    return solver.init(None, u, None, {"trust": trust}, None, None, frozenset())

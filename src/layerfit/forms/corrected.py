@@ -307,7 +307,7 @@ def _widened(target: Microfacets, order: int, below: _Below, spread: Width) -> W
         total = _component(spread, axis) + order * _power(_component(target.width, axis), p)
         if order > 1:
             total = total + (order - 1) * _power(_component(below.spreads[-1][0], axis), p)
-        width = jnp.minimum(safe_sqrt(total) if p == 2.0 else jnp.power(total, 1.0 / p), WIDEST)
+        width = jnp.minimum(safe_sqrt(total) if p == 2.0 else safe_power(total, 1.0 / p), WIDEST)
         return width
 
     return _per_axis([spread], along)

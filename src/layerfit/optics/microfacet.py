@@ -13,7 +13,7 @@ from typing import Literal
 import jax
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_divide, safe_sqrt
+from .._chunk import chunk, dot, safe_divide, safe_sqrt
 from .._types import Scalar, Vec3
 
 Distribution = Literal["ggx", "beckmann"]
@@ -129,7 +129,7 @@ def v_smith_separable(NoL: Scalar, NoV: Scalar, projection_l: Scalar, projection
 def v_cavity(wi: Vec3, wo: Vec3) -> Scalar:
     """G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10)."""
     s = wi + wo
-    NoH_over_c = 2.0 * s[2] / jnp.maximum(jnp.dot(s, s), 1e-20)
+    NoH_over_c = 2.0 * s[2] / jnp.maximum(dot(s, s), 1e-20)
     return jnp.minimum(safe_divide(0.25, wi[2] * wo[2]), safe_divide(0.5 * NoH_over_c, jnp.maximum(wi[2], wo[2])))
 
 
@@ -146,7 +146,7 @@ def visibility(masking: Masking, distribution: Distribution, wi: Vec3, wo: Vec3,
 def half_vector(wi: Vec3, wo: Vec3) -> Vec3:
     """The unit vector halfway between two directions on the same side of the surface."""
     s = wi + wo
-    return s / jnp.sqrt(jnp.maximum(jnp.dot(s, s), 1e-20))
+    return s / jnp.sqrt(jnp.maximum(dot(s, s), 1e-20))
 
 
 @chunk
@@ -154,4 +154,4 @@ def half_cosine(wi: Vec3, wo: Vec3) -> Scalar:
     """The cosine between either direction and their half vector."""
     # |wi + wo| / 2: the dot product with the half vector loses it near 0 (grazing, opposite).
     s = wi + wo
-    return jnp.minimum(0.5 * safe_sqrt(jnp.dot(s, s)), 1.0)
+    return jnp.minimum(0.5 * safe_sqrt(dot(s, s)), 1.0)

@@ -120,13 +120,6 @@ def _sum(body: Any, eqn: Any, a: Value) -> Value:
     return Value(f"dot({lift(a, kind).text}, {kind}(1.0))", "float", reads=a.reads)
 
 
-def _dot(body: Any, eqn: Any, a: Value, b: Value) -> Value:
-    if eqn.params["dimension_numbers"] != (((0,), (0,)), ((), ())):
-        raise PrintError("only the dot product of two vectors has a GLSL form")
-    kind = glsl_type(eqn.invars[0].aval)
-    return Value(f"dot({lift(a, kind).text}, {lift(b, kind).text})", "float", reads=reads(a, b))
-
-
 def _integer_power(body: Any, eqn: Any, a: Value) -> Value:
     y = eqn.params.get("y", 2)
     if not re.fullmatch(r"[\w.]+", a.text):
@@ -142,6 +135,9 @@ def _clamp(body: Any, eqn: Any, low: Value, x: Value, high: Value) -> Value:
     low, x, high = (lift(v, kind) for v in (low, x, high))
     return Value(f"clamp({x.text}, {low.text}, {high.text})", kind, reads=reads(low, x, high))
 
+
+BUILTINS = {"dot"}
+"""Traced functions that GLSL has by the same name."""
 
 PRIMITIVES: dict[str, Callable[..., Value]] = {
     "add": _operator("+", SUM, "0.0", neutral_left=True),
@@ -178,5 +174,4 @@ PRIMITIVES: dict[str, Callable[..., Value]] = {
     "concatenate": _build,
     "stack": _build,
     "reduce_sum": _sum,
-    "dot_general": _dot,
 }

@@ -14,9 +14,9 @@ import jax
 import numpy as np
 from jax.extend.core import Literal
 
-from .glsl import ATOM, PREFIX, UNARY, PrintError, StructType, Value, glsl_type, indent, lift, literal, safe
+from .glsl import ATOM, PREFIX, UNARY, PrintError, StructType, Value, glsl_type, indent, lift, literal, reads, safe
 from .names import name_of, source_of
-from .primitives import PRIMITIVES
+from .primitives import BUILTINS, PRIMITIVES
 
 
 class Printer:
@@ -246,6 +246,8 @@ class Body:
         primitive = eqn.primitive.name
         if primitive in ("jit", "pjit"):
             closed, called = eqn.params["jaxpr"], eqn.params["name"]
+            if called in BUILTINS:
+                return [Value(f"{called}({', '.join(a.text for a in operands)})", "float", reads=reads(*operands))]
             if called in self.printer.chunks:
                 return self._call(closed, called, operands, name)
             return self._inline(eqn, closed, operands)
