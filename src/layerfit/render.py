@@ -21,7 +21,7 @@ def radiance(
     sample brings per unit of BRDF: irradiance times cosine for a distant light. Channels come first, in and out: none depends on
     another, what they share is computed once, and the loops of the compiled code run over pixels.
     """
-    colours = jax.tree.map(lambda value: 0 if value.ndim else None, stack)
+    colours = jax.tree.map(lambda value: 0 if jnp.ndim(value) else None, stack)
     return jax.vmap(_channel, in_axes=(colours, None, None, 0))(stack, wi, wo, weight)
 
 
@@ -53,8 +53,8 @@ def block_size(lights: int) -> int:
 def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Linear radiance (n, 3) of any number of pixels, computed in float32 and block by block.
 
-    `wi` and `weight` are (n, s, 3) for s light samples a pixel, `wo` is (n, 3), and `weight` has its channels last. Materials of the same structure
-    share one executable for each s.
+    `wi` and `weight` are (n, s, 3) for s light samples a pixel, channels last, and `wo` is (n, 3). Materials of the same structure share
+    one executable for each s.
     """
     size = block_size(wi.shape[1])
     stack = stack.astype(np.float32)
