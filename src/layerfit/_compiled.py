@@ -21,7 +21,7 @@ class Clock:
 
 CLOCK = Clock()
 
-OPTIONS = {"xla_disable_hlo_passes": "call-inliner"}
+OPTIONS: Any = {"xla_disable_hlo_passes": "call-inliner"}
 """Shading functions stay functions: inlined, they are fused to loops of a thousand operations, which LLVM no longer vectorises (two
 to four times slower)."""
 

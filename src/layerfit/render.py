@@ -13,13 +13,22 @@ from .stack import Stack, evaluate
 
 
 def radiance(
+    stack: Stack, wi: Float[Array, "n s 3"], wo: Float[Array, "n 3"], weight: Float[Array, "n s 3"]
+) -> Float[Array, "n 3"]:
+    """Linear radiance (n, 3) of n pixels with s light samples each; traced, for JAX to differentiate or compile.
+
+    `wi` (n, s, 3) and `wo` (n, 3) are unit directions in the surface frame of each pixel; `weight` (n, s, 3) is what each light
+    sample brings per unit of BRDF: irradiance times cosine for a distant light.
+    """
+    return channels(stack, wi, wo, jnp.moveaxis(weight, -1, 0)).T
+
+
+def channels(
     stack: Stack, wi: Float[Array, "n s 3"], wo: Float[Array, "n 3"], weight: Float[Array, "3 n s"]
 ) -> Float[Array, "3 n"]:
-    """Linear radiance (3, n) of n pixels with s light samples each; traced, for JAX to differentiate or compile.
+    """`radiance` with the channels first, in and out.
 
-    `wi` (n, s, 3) and `wo` (n, 3) are unit directions in the surface frame of each pixel; `weight` (3, n, s) is what each light
-    sample brings per unit of BRDF: irradiance times cosine for a distant light. Channels come first, in and out: none depends on
-    another, what they share is computed once, and the loops of the compiled code run over pixels.
+    None depends on another: what they share is computed once, and the loops of the compiled code run over pixels.
     """
     colours = jax.tree.map(lambda value: 0 if jnp.ndim(value) else None, stack)
     return jax.vmap(_channel, in_axes=(colours, None, None, 0))(stack, wi, wo, weight)
@@ -41,7 +50,7 @@ def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any) -> Any:
     return jnp.sum(jax.vmap(lambda w: evaluate(form, prepared, w, wo))(wi) * weight)
 
 
-_compiled = Compiled(radiance)
+_compiled = Compiled(channels)
 _BLOCK = 1024
 
 

@@ -223,7 +223,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float spread = (pow(max(i.spread, 1e-30), 1.34) + pow(max(o.spread, 1e-30), 1.34)) * pow(max(lf_coat.alpha, 1e-30), 1.34);
     float total = spread + 3.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
     total = total + 2.0 * pow(max(lf_coat.alpha, 1e-30), 1.34);
-    float width = min(pow(total, 0.74626863), 1.5);
+    float width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
@@ -231,14 +231,14 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     vec3 lobes = D * V / max(1.0 - q, 1e-06);
     total = spread + 2.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
     total = total + pow(max(lf_coat.alpha, 1e-30), 1.34);
-    width = min(pow(total, 0.74626863), 1.5);
+    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
     V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes = D * V + q * lobes;
     total = spread + pow(max(lf_base.alpha, 1e-30), 1.34);
-    width = min(pow(total, 0.74626863), 1.5);
+    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);

@@ -5,6 +5,7 @@ a fit starts on one block and ends on all of them. Blocks are padded with pixels
 """
 
 import dataclasses
+from typing import Any
 
 import jax
 import numpy as np
@@ -24,8 +25,8 @@ class Block:
     weight: Float[Array, "3 n s"]
     target: Float[Array, "3 n"]
     inverse_sigma: Float[Array, "3 n"]
-    scale: Float[Array, " layers"] | None
-    """Thickness over that of the material; absent where it is 1 everywhere."""
+    scale: Any
+    """(layers,): thickness over that of the material; absent where it is 1 everywhere."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._compiled import Compiled
 from ..layers import Coat
-from ..render import radiance
+from ..render import channels
 from ..stack import Stack
 from .blocks import Block
 from .parameters import Parametrisation
@@ -39,7 +39,7 @@ def _columns(u: Any, start: Stack, block: Block, *, free: Parametrisation) -> An
     """The model's derivatives and residual over one block of pixels at `u`, in the precision of the block."""
 
     def residual(fields: list[Any]) -> Any:
-        model = radiance(_material(start, free, fields, block), block.wi, block.wo, block.weight)
+        model = channels(_material(start, free, fields, block), block.wi, block.wo, block.weight)
         return (model - block.target) * block.inverse_sigma
 
     return columns(residual, free.fields(u))
