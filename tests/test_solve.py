@@ -98,6 +98,33 @@ def test_bounds_always_hold_and_the_rest_is_fitted():
     assert float(state.loss) == pytest.approx(wanted.cost, rel=1e-4)
 
 
+def test_a_step_that_the_bounds_turn_uphill_is_shortened():
+    """In a narrow valley across the bounds, the cut Newton step lands on its wall; the quadratic loss is known exactly."""
+    gram = jnp.array([[1.0, 0.99], [0.99, 1.0]])
+    valley = jnp.array([-3.0, 3.5])
+    lower, upper = jnp.array([0.0, 0.0]), jnp.array([10.0, 10.0])
+
+    def fn(y, args):
+        away = y - valley
+        return 0.5 * away @ gram @ away, (gram @ away, gram)
+
+    solver = NormalLevenbergMarquardt()
+    y = jnp.array([0.4, 0.1])
+    away = y - valley
+    cut = jnp.clip(valley, lower, upper) - valley
+    assert cut @ gram @ cut > away @ gram @ away, "the test is none: the cut step goes downhill"
+    state = initial(y, solver, 1e6)
+    losses = []
+    for _ in range(60):
+        y, state = solver.step(fn, y, None, {"lower": lower, "upper": upper}, state, frozenset())[:2]
+        losses.append(float(state.loss))
+        if bool(state.done):
+            break
+    assert state.done
+    assert np.all(np.diff(losses) <= 0.0), "a step uphill was taken"
+    np.testing.assert_allclose(y, [0.0, 3.5 - 0.99 * 3.0], atol=1e-4)  # on the bound, and where the slope along it ends
+
+
 def test_units_of_the_parameters_do_not_matter():
     units = jnp.array([1.0, 1e-2, 1e3, 1.0, 1e2])
     scaled = lambda f, target: residual([a * u for a, u in zip(f, fields(units), strict=True)], target)  # noqa: E731

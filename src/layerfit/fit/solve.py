@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import lineax as lx
 import numpy as np
 import optimistix as optx
+from jax import lax
 from jaxtyping import Array, Float, PyTree
 
 Normal = tuple[Float[Array, ""], tuple[Float[Array, " n"], Float[Array, "n n"]]]
@@ -79,6 +80,8 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     atol: float = 1e-6
     gain: float = 1e-8
     """Part of the loss that a step has to promise to be worth taking: far less than noise can tell apart."""
+    least: float = 1e-9
+    """Trust below which no step is taken."""
     norm: Callable[[PyTree], Any] = optx.max_norm
     descent: optx.AbstractDescent = optx.DampedNewtonDescent(linear_solver=lx.Cholesky())
     search: optx.AbstractSearch = optx.ClassicalTrustRegion()
@@ -118,10 +121,17 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
             jnp.where(accept, new, old) for new, old in ((loss, state.loss), (gradient, state.gradient), (gram, state.gram))
         )
         held = ((y <= lower) & (gradient > 0.0)) | ((y >= upper) & (gradient < 0.0))
-        y_eval = jnp.clip(y + self._descend(gradient, gram, held, step_size), lower, upper)
-        move = y_eval - y
-        promised = -(gradient @ move + 0.5 * move @ gram @ move)
-        done = done | (promised <= self.gain * loss) | (step_size < 1e-9) | ~jnp.isfinite(loss)
+        step = lambda trust: self._descend(gradient, gram, held, trust)  # noqa: E731
+        move = lambda trust: jnp.clip(y + step(trust), lower, upper) - y  # noqa: E731
+        promise = lambda move: -(gradient @ move + 0.5 * move @ gram @ move)  # noqa: E731
+        done = done | (promise(step(step_size)) <= self.gain * loss) | ~jnp.isfinite(loss)
+        # Cut off at the bounds, a step can lead uphill. A shorter one is nearer to the gradient, and in the end does not.
+        step_size = lax.while_loop(
+            lambda trust: (promise(move(trust)) <= 0.0) & (trust > self.least) & ~done, lambda trust: 0.25 * trust, step_size
+        )
+        done = done | (step_size <= self.least)
+        y_eval = y + move(step_size)
+        search = eqx.tree_at(lambda s: s.step_size, search, step_size)
         state = _State(jnp.array(False), y_eval, loss, gradient, gram, search, step_size, done, result)
         return y, state, (gradient, gram)
 
