@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import camera_rays, frames, sphere_surface, sphere_tangent
@@ -184,6 +185,68 @@ def test_a_mask_is_used(lambert, tmp_path):
     write_exr(tmp_path / "small.exr", {"Y": mask[:10]})
     with pytest.raises(InputError, match="the mask is 48 x 10"):
         load_reference(reference(lambert(), mask=tmp_path / "small.exr"), 0.1)
+
+
+@pytest.mark.parametrize("kind", ["1 bit", "8 bits", "16 bits", "RGB", "grey and alpha"])
+def test_a_mask_is_read_from_a_png(lambert, tmp_path, kind):
+    """Just above half is inside, just below is not."""
+    upper = np.arange(48)[:, None] < 24 + np.zeros(48)
+    grey = np.where(upper, 128, 127).astype(np.uint8)
+    pictures = {
+        "1 bit": Image.fromarray(upper),
+        "8 bits": Image.fromarray(grey),
+        "16 bits": Image.fromarray(np.where(upper, 32768, 32767).astype(np.uint16)),
+        "RGB": Image.fromarray(np.stack([grey, 255 - grey, grey], -1)),
+        "grey and alpha": Image.fromarray(np.stack([grey, np.full_like(grey, 255)], -1), "LA"),
+    }
+    pictures[kind].save(tmp_path / "mask.png")
+    view = load_reference(reference(lambert(), mask=tmp_path / "mask.png"), 0.1)
+    write_exr(tmp_path / "mask.exr", {"Y": upper})
+    same = load_reference(reference(lambert(), mask=tmp_path / "mask.exr"), 0.1)
+    np.testing.assert_array_equal(view.index, same.index)
+    assert view.dropped["masked"] > 100
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda png: png[:30], r"mask\.png: is a damaged PNG picture"),
+        (lambda png: png[:-30], r"mask\.png: is a damaged PNG picture"),
+        (lambda png: b"", r"mask\.png: is not a PNG picture"),
+        (lambda png: b"II*\0" + png, r"mask\.png: is not a PNG picture"),
+        (lambda png: None, r"mask\.png: cannot be read: No such file"),
+    ],
+)
+def test_a_png_that_is_none_is_refused(lambert, tmp_path, spoil, said):
+    path = tmp_path / "mask.png"
+    Image.fromarray(np.full((48, 48), 255, np.uint8)).save(path)
+    content = spoil(path.read_bytes())
+    path.unlink()
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=said):
+        load_reference(reference(lambert(), mask=path), 0.1)
+
+
+def test_a_png_of_another_size_is_refused(lambert, tmp_path):
+    Image.fromarray(np.full((10, 48), 255, np.uint8)).save(tmp_path / "mask.png")
+    with pytest.raises(InputError, match=r"mask\.png: the mask is 48 x 10, the reference 48 x 48 pixels"):
+        load_reference(reference(lambert(), mask=tmp_path / "mask.png"), 0.1)
+
+
+def test_pixels_whose_tangent_is_no_direction_are_left_out(lambert):
+    """Zero where there are no texture coordinates, or along the normal."""
+    surface = sphere_surface(Sphere(), CAMERA, 48, 48)
+    tangent = np.nan_to_num(sphere_tangent(surface.normal, CAMERA.up))
+    tangent[:20] = 0.0
+    tangent[20:24] = np.nan_to_num(surface.normal[20:24])
+    tangent[24:25] = np.nan
+    path = lambert(**{f"T_{c}": tangent[..., k] for k, c in enumerate("XYZ")})
+    view = load_reference(reference(path), 0.1)
+    assert view.dropped["without a tangent"] > 300
+    assert np.all(view.index // 48 >= 25)
+    samples = view.samples()
+    np.testing.assert_allclose(np.linalg.norm(samples.wi, axis=-1), 1.0, atol=1e-6)
 
 
 @pytest.mark.parametrize(

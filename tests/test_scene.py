@@ -70,6 +70,12 @@ def test_a_scene_is_read(scene, tmp_path):
     np.testing.assert_array_equal(s.start.layers[0].tau, [0.1, 0.2, 0.3])
 
 
+def test_a_path_may_be_text(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    assert read_scene(str(path)).references == read_scene(path).references
+
+
 def test_json_is_read_like_toml(tmp_path):
     import tomllib
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from .channels import Channels, resolve
 from .exr import read_exr
 from .geometry import Surface, frames, normalise, sphere_surface, sphere_tangent
 from .lights import is_exact, receive
+from .png import read_png
 from .scene import Reference, Scene
 
 QUADRATURE = 992
@@ -19,6 +19,9 @@ QUADRATURE = 992
 
 PROBES = 256
 """Pixels, and directions of each, that are tried before a quadrature is said to receive no light."""
+
+LEAST_SINE = 1e-3
+"""Of the angle between tangent and normal, times the length of the tangent: below it rounding decides where the tangent points."""
 
 LEAST_PIXELS = 32
 """Fewer usable pixels than this are a fault of the scene, not a reference."""
@@ -81,6 +84,15 @@ class View:
         image[self.index] = values
         return image.reshape(*self.shape, *values.shape[1:])
 
+    def check(self, stack: Stack) -> None:
+        """Raise `InputError` for a material that cannot be drawn here: one with a grain, where nothing says which way it runs."""
+        grain = [layer.name for layer in (*stack.layers, stack.base) if getattr(layer, "alpha_x", None) is not None]
+        if grain and self.tangent is None:
+            raise InputError(
+                f"{self.reference.exr}: {grain[0]}.alpha_x is measured along a tangent, and there is none. Render a tangent channel, name it "
+                f'with tangent = "..." under [reference], give [geometry] kind = "sphere", or give {grain[0]} one width, alpha'
+            )
+
     def scales(self, stack: Stack) -> np.ndarray | None:
         """Thickness of each coat in this image over that of the material, or None where all are 1."""
         scale = [self.reference.thickness_scale.get(layer.name, 1.0) for layer in stack.layers]
@@ -126,6 +138,9 @@ def load_reference(reference: Reference, min_cosine: float) -> View:
         "masked": _mask(reference.mask, (height, width)),
         f"seen at a grazing angle (cosine below {min_cosine:g})": min_cosine < NoV,
     }
+    if tangent is not None:
+        # A surface without texture coordinates has zeros in the tangent channel: no frame can be made of them.
+        reasons["without a tangent"] = np.linalg.norm(np.cross(tangent, surface.normal), axis=-1) > LEAST_SINE
     kept = np.ones((height, width), bool)
     dropped = {}
     for reason, passes in reasons.items():
@@ -208,8 +223,7 @@ def _eroded(mask: np.ndarray) -> np.ndarray:
 def _mask(path: Path | None, shape: tuple[int, int]) -> np.ndarray:
     if path is None:
         return np.ones(shape, bool)
-    channels: dict[str, Any] = dict(read_exr(path).channels)
-    first = next(iter(channels.values()))
+    first = read_png(path) if path.suffix.lower() == ".png" else next(iter(read_exr(path).channels.values()))
     if first.shape != shape:
         raise InputError(
             f"{path}: the mask is {first.shape[1]} x {first.shape[0]}, the reference {shape[1]} x {shape[0]} pixels"

@@ -123,8 +123,9 @@ class Scene:
     fit: FitRequest
 
 
-def read_scene(path: Path) -> Scene:
+def read_scene(path: str | Path) -> Scene:
     """Read a scene file (TOML or JSON). Raises `InputError` naming the key at fault."""
+    path = Path(path)
     document = read_document(path)
     where = str(path)
     check_keys(document, ("reference", "geometry", "camera", "light", "material", "fit"), where)
