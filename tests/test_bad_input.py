@@ -128,7 +128,7 @@ SCENES = {
     ),
     "no effect": (
         in_scene("tau = [0.3, 0.3, 0.3]", "tau = [19, 19, 19]"),
-        [r"base\.alpha has no effect on this image", r"leave it out"],
+        [r"coat\.tau, base\.alpha have no effect on this image", r"leave them out"],
     ),
     "nothing to fit": (
         in_scene('free = ["coat.alpha", "coat.eta", "coat.tau", "base.alpha"]', "free = []"),

@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 
 from commands import SIDE, TRUTH, layerfit, process, snapshot, write_reference
-from layerfit import __version__
+from layerfit import __version__, fit_scene
 from layerfit._data import references
 from layerfit.capture.exr import read_exr
 from layerfit.preset import read_preset
@@ -322,6 +322,13 @@ def _find(document, key):
     return next(filter(None, (_find(v, key) for v in document)), None) if isinstance(document, list) else None
 
 
+def test_a_fit_from_python_takes_paths_as_text(scene, gl, tmp_path):
+    outcome = fit_scene(str(scene), str(tmp_path / "out"), starts=1)
+    assert outcome.good
+    assert outcome.directory == tmp_path / "out"
+    assert (tmp_path / "out" / "fit.json").is_file()
+
+
 def test_the_demonstration_fits_what_is_shipped(scene, gl, tmp_path, monkeypatch):
     monkeypatch.setattr("layerfit.demo.references", lambda: scene.parent)
     ran = layerfit("demo", "-o", tmp_path)
@@ -329,17 +336,6 @@ def test_the_demonstration_fits_what_is_shipped(scene, gl, tmp_path, monkeypatch
     assert "[1/1] scene" in ran.err
     assert str(tmp_path / "scene" / "fit.png") in ran.err
     assert (tmp_path / "scene" / "fit.json").is_file()
-
-
-def test_an_interrupt_is_said(scene, gl, tmp_path, monkeypatch):
-    def interrupted(*args, **options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("layerfit.job.fit", interrupted)
-    ran = layerfit("fit", scene, "-o", tmp_path / "out")
-    assert (ran.code, ran.out) == (130, "")
-    assert "interrupted" in ran.err
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_closed_pipe_is_no_fault(scene):

@@ -16,6 +16,7 @@ from layerfit.fit.fit import fit
 from layerfit.fit.residuals import scaled
 from layerfit.fit.result import to_json
 from layerfit.fit.weights import inverse_sigma, noise_law, robust
+from layerfit.fit.words import measured
 from layerfit.layers import Coat
 from layerfit.render import predict
 from layerfit.stack import Stack
@@ -114,14 +115,16 @@ def test_light_from_everywhere_is_fitted_through_its_quadrature(see):
 
 def test_a_parameter_without_effect_is_refused_by_name(see):
     opaque = Stack((Coat(alpha=0.12, eta=1.5, tau=40.0),), Conductor(alpha=0.2, **COPPER))
-    with pytest.raises(InputError, match=r"base\.alpha has no effect on this image"):
+    with pytest.raises(InputError, match=r"free: base\.alpha has no effect on this image"):
         fit([see(opaque)], opaque, free=["coat.alpha", "base.alpha"], starts=1)
+    with pytest.raises(InputError, match=r"free: base\.alpha, base\.k have no effect on this image"):
+        fit([see(opaque)], opaque, free=["coat.alpha", "base.alpha", "base.k"], starts=1)
 
 
 def test_a_parameter_without_effect_that_was_not_asked_for_is_held_with_a_note(see):
     opaque = Stack((Coat(alpha=0.2, eta=1.5, tau=40.0),), Conductor(alpha=0.2, **COPPER))
     result = fit([see(opaque)], opaque, starts=1)
-    assert any("base.alpha" in note for note in result.notes)
+    assert result.notes == ["coat.tau, base.alpha have no effect on this image and were held at the start"]
     assert "base.alpha" not in values(result)
 
 
@@ -133,6 +136,75 @@ def test_a_parameter_that_wants_to_leave_its_range_is_flagged(see):
     assert result["parameters"]["base.albedo"]["at_bound"] == "upper"
     assert "at_bound:base.albedo" in result["flags"]
     assert np.max(result["parameters"]["base.albedo"]["value"]) <= 1.0
+    sigma = result["parameters"]["base.albedo"]["sigma"]
+    assert sigma[0] is None, "nothing tells how far it would go"
+    assert min(sigma[1:]) > 0.0
+    assert json.loads(json.dumps(result, allow_nan=False))["parameters"]["base.albedo"]["sigma"] == sigma
+
+
+def test_a_tau_that_follows_from_a_bound_has_no_sigma(see):
+    clear = Stack((Coat(alpha=0.12, eta=1.5, tau=[0.0, 0.25, 0.7]),), Conductor(alpha=0.2, **COPPER))
+    view = see(clear)
+    view = dataclasses.replace(view, target=view.target * np.array([1.1, 1.0, 1.0], np.float32))
+    coat = Coat(alpha=0.12, eta=1.5, absorption_per_mm=[6.0, 6.0, 6.0], thickness_um=50.0)
+    result = fit([view], dataclasses.replace(clear, layers=(coat,)), free=["coat.absorption_per_mm"], starts=1)
+    for name in ("coat.absorption_per_mm", "coat.tau"):
+        row = document(result)["parameters"][name]
+        assert row["value"][0] == 0.0, name
+        assert row["sigma"][0] is None, name
+        assert min(row["sigma"][1:]) > 0.0, name
+
+
+def test_a_fit_that_misses_the_image_is_called_poor(see, clean):
+    assert clean.misfit < 1e-3
+    assert "poor_fit" not in document(clean)["flags"]
+    stripes = see()
+    stripes = dataclasses.replace(stripes, target=stripes.target * (1.0 + 0.3 * (stripes.index[:, None] // 8 % 2)))
+    poor = fit([stripes], START, starts=2)
+    assert 0.1 < poor.misfit < 0.2
+    assert "poor_fit" in document(poor)["flags"]
+    assert document(poor)["misfit"] == pytest.approx(poor.misfit, rel=1e-3)
+
+
+def test_noise_that_is_stated_makes_no_poor_fit(see):
+    """The same image twice: what the file knows to be noise is not the model's fault."""
+    view = see()
+    noise = 0.2 * view.target**0.7
+    noisy = dataclasses.replace(view, target=view.target + noise * np.random.default_rng(0).normal(size=noise.shape))
+    stated = dataclasses.replace(noisy, noise=noise)
+    assert "poor_fit" in document(fit([noisy], TRUTH, starts=1))["flags"]
+    assert "poor_fit" not in document(fit([stated], TRUTH, starts=1))["flags"]
+
+
+def test_sigmas_say_what_they_are_of(clean):
+    assert "not of what the form of the model gets wrong" in document(clean)["sigma_is"]
+
+
+def test_a_result_shows_itself(clean):
+    text = repr(clean)
+    assert text.startswith("Coat over Conductor; converged: yes, after ")
+    assert "flags: none" in text
+    assert len(text.splitlines()) == 1 + len(values(clean))
+    page = clean._repr_html_()
+    for name, row in document(clean)["parameters"].items():
+        assert f"    {name}:" in text
+        assert f"<th>{name}</th>" in page
+        shown = measured(row["value"], row["sigma"])[0]
+        assert shown in text
+        assert shown in page
+    assert page.count("<tr>") == 1 + len(values(clean))
+
+
+def test_a_grain_needs_a_tangent(see):
+    brushed = Stack((), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.3, **COPPER))
+    view = see(brushed)
+    assert fit([view], brushed, starts=1).converged
+    with pytest.raises(InputError, match=r"sphere\.exr: base\.alpha_x is measured along a tangent, and there is none\. Render"):
+        fit([dataclasses.replace(view, tangent=None)], brushed, starts=1)
+    coated = dataclasses.replace(TRUTH, layers=(Coat(alpha=None, alpha_x=0.1, alpha_y=0.3),))
+    with pytest.raises(InputError, match=r"coat\.alpha_x is measured along a tangent"):
+        dataclasses.replace(view, tangent=None).check(coated)
+    dataclasses.replace(view, tangent=None).check(TRUTH)
 
 
 def test_a_wall_of_pixels_too_bright_does_not_pull_a_robust_fit(see):

@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from layerfit.fit.words import SIGMA, measured, table
 from layerfit.report import pictures
-from layerfit.report.text import image_error, lines, measured, relative, worst
+from layerfit.report.html import page
+from layerfit.report.text import image_error, lines, relative, worst
 
 DOCUMENT = {
     "model": {"name": "faithful", "options": {"refract_at": "n"}, "layers": "Coat over Lambert"},
     "converged": False,
-    "flags": ["not_converged", "at_bound:coat.alpha"],
+    "flags": ["not_converged", "poor_fit", "at_bound:coat.alpha"],
+    "misfit": 0.234,
+    "sigma_is": SIGMA,
     "steps": 12,
     "starts": 3,
     "minima": [{"start": 0, "cost": 1.0}, {"start": 2, "cost": 1.01}, {"start": 1, "cost": 7.0}],
@@ -45,14 +49,16 @@ DOCUMENT = {
     [
         "Coat over Lambert, faithful form, refract_at = n",
         "converged:   NO, after 12 steps",
-        "not_converged, at_bound:coat.alpha",
+        "not_converged, poor_fit, at_bound:coat.alpha",
+        "The model misses 23 % of the image.",
+        "[[Parameters]] (sigmas are of noise and scatter, not of what the form of the model gets wrong",
         "50 used, drawn at random from 100 that can be compared; left out: 7 NaN or infinite, 1 masked",
         "5 % of the value, 2 % of the image's brightness and the noise of the files that state it; huber loss",
         "pictures 992 directions a pixel, 0.82 % rms error of a pixel; the fit 495, 1.4 %",
         "3, of which 2 reached this minimum",
-        "0.001 +/- unknown  (start 0.3, at its lower bound, not identifiable)",
+        "0.001 +/- –  (start 0.3, at its lower bound, not identifiable)",
         "50.0 +/- 3.1 um  (start 10)",
-        "[0.100, 0.200, 0.3] +/- [0.010, 0.020, unknown]  (= absorption_per_mm * thickness_um)",
+        "[0.100, 0.200, 0.3] +/- [0.010, 0.020, –]  (= absorption_per_mm * thickness_um)",
         "C(coat.alpha, coat.tau[0]) = -0.970",
         "can change together without changing the image",
         "was held at its start",
@@ -63,6 +69,20 @@ DOCUMENT = {
 )
 def test_the_report_says(said):
     assert said in "\n".join(lines(DOCUMENT))
+
+
+def test_a_good_fit_is_not_called_poor():
+    assert "misses" not in "\n".join(lines(DOCUMENT | {"flags": []}))
+
+
+def test_the_page_says_what_the_terminal_says():
+    text = page("<name>", DOCUMENT, b"", b"", "")
+    assert "&lt;name&gt;" in text
+    assert "The model misses 23 % of the image." in text
+    assert SIGMA in text.split("[[Fit]]")[0], "beside the table, not only in the lines below it"
+    assert "The model misses" not in page("", DOCUMENT | {"flags": []}, b"", b"", "")
+    assert "<td>&plusmn; –</td>" in table(DOCUMENT["parameters"])
+    assert "<td>um</td>" in table(DOCUMENT["parameters"])
 
 
 @pytest.mark.parametrize(
@@ -87,9 +107,9 @@ def test_weights_in_words(weighting, said):
         (123.4, 12.0, ("123", "12")),
         (1e-4, 2.0, ("0.0", "2.0")),
         (0.0, 0.1, ("0", "0.1")),
-        (1.5, None, ("1.5", "unknown")),
-        ([0.1, 0.2], [0.01, None], ("[0.100, 0.2]", "[0.010, unknown]")),
-        ([0.1, 0.2], None, ("[0.1, 0.2]", "[unknown, unknown]")),
+        (1.5, None, ("1.5", "–")),
+        ([0.1, 0.2], [0.01, None], ("[0.100, 0.2]", "[0.010, –]")),
+        ([0.1, 0.2], None, ("[0.1, 0.2]", "[–, –]")),
     ],
 )
 def test_digits_follow_from_sigma(value, sigma, said):

@@ -5,9 +5,9 @@ from .capture.inspect import inspect as inspect
 from .capture.samples import Samples as Samples, View as View, load as load
 from .capture.scene import Scene as Scene, read_scene as read_scene
 from .errors import InputError as InputError, LayerfitError as LayerfitError, MachineError as MachineError
-from .fit.fit import FitResult as FitResult, fit as fit
+from .fit.fit import fit as fit
 from .fit.metrics import image_error as image_error
-from .fit.result import parameters as parameters
+from .fit.result import FitResult as FitResult, parameters as parameters
 from .forms.corrected import Corrected as Corrected
 from .forms.faithful import Faithful as Faithful
 from .job import fit_scene as fit_scene

@@ -5,8 +5,9 @@ from typing import Any
 
 from ._data import references
 from .documents import check_directory
+from .fit.words import measured
 from .job import Outcome, fit_scene
-from .report.text import image_error, measured, relative
+from .report.text import image_error, relative
 
 
 def run(directory: Path, console: Any) -> bool:

@@ -16,11 +16,12 @@ from .capture.samples import QUADRATURE, Samples, View, load
 from .capture.scene import read_scene
 from .documents import check_directory, finite, write_bytes, write_text
 from .errors import InputError
-from .fit.fit import FitResult, fit
+from .fit.fit import fit
 from .fit.metrics import exposure, image_error
 from .fit.residuals import scaled
-from .fit.result import to_json
+from .fit.result import FitResult, to_json
 from .fit.weights import FLOOR_SHARE, MODEL_SHARE
+from .fit.words import structure
 from .preset import model_name, preset_of
 from .render import predict
 from .report import html, pictures
@@ -50,13 +51,19 @@ class Outcome:
 
 
 def fit_scene(
-    path: Path, directory: Path, *, import_s: float = 0.0, progress: Progress = lambda stage, share: None, **options: Any
+    path: str | Path,
+    directory: str | Path,
+    *,
+    import_s: float = 0.0,
+    progress: Progress = lambda stage, share: None,
+    **options: Any,
 ) -> Outcome:
     """Fit a scene and write everything to `directory`; each file whole or not at all, `fit.json` last.
 
     `options` override the scene's [fit] table. Raises `LayerfitError` for input or a machine that is at fault.
     """
     began = time.perf_counter()
+    path, directory = Path(path), Path(directory)
     scene = read_scene(path)
     request = dataclasses.replace(scene.fit, **{k: v for k, v in options.items() if v is not None})
     views = load(scene)
@@ -125,7 +132,7 @@ def _model(stack: Stack) -> dict[str, Any]:
     return {
         "name": model_name(stack),
         "options": preset_of(stack, "").get("options", {}),
-        "layers": " over ".join(type(layer).__name__ for layer in (*stack.layers, stack.base)),
+        "layers": structure(stack),
     }
 
 
@@ -188,6 +195,7 @@ def draw_all(compared: Sequence[View], drawn: Sequence[View], shader: Shader) ->
     """Draw a material where references were seen, by JAX and by its shader in OpenGL."""
     drawings = []
     for view, whole in zip(compared, drawn, strict=True):
+        view.check(shader.stack)
         scale = view.scales(shader.stack)
         thick = shader if scale is None else print_material(scaled(shader.stack, scale), shader.name)
         drawings.append(draw(view, whole, thick))
@@ -252,6 +260,7 @@ def write_render(stack: Stack, views: Sequence[View], output: Path) -> list[Path
     check_directory(output.parent)
     written = []
     for k, view in enumerate(views):
+        view.check(stack)
         path = output if len(views) == 1 else output.with_stem(f"{output.stem}_{k + 1}")
         thick = scaled(stack, view.scales(stack))
         image = view.image(np.concatenate([predict(thick, *samples.arrays) for samples in _portions(view)]))

@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from .._compiled import CLOCK, Clock
+from .._compiled import CLOCK
 from ..capture.samples import QUADRATURE, Samples, View
 from ..errors import InputError
 from ..render import predict
@@ -16,9 +16,10 @@ from ..stack import Stack
 from .blocks import Block, arrange, channels_first
 from .parameters import Parametrisation, parametrise, with_fixed
 from .residuals import NEAR, initial, scaled, step
+from .result import FitResult, Held, Minimum, Row
 from .solve import NormalLevenbergMarquardt
-from .uncertainty import GROUPS, Uncertainty, estimate
-from .weights import inverse_sigma, robust
+from .uncertainty import GROUPS, estimate
+from .weights import inverse_sigma, misfit, robust
 
 PIXELS = 65536
 """Pixels that a fit uses at most, all references together: more of them do not change the answer by what it can be wrong by."""
@@ -36,62 +37,6 @@ COARSE_STEPS = 12
 FINE_STEPS = 60
 ROUNDS = 3
 """Reweightings: the weights follow the model's values, which follow the weights."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Row:
-    """One step of the fit, for the convergence trace."""
-
-    time_s: float
-    stage: str
-    start: int
-    step: int
-    error: float
-    """Weighted residual over the weighted image, root of sums of squares, of the pixels in use."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Minimum:
-    """Where one start led."""
-
-    start: int
-    vector: np.ndarray
-    cost: float
-
-
-@dataclasses.dataclass(frozen=True)
-class Held:
-    """A free parameter that was held at its start, because the data cannot tell it from another."""
-
-    direction: dict[str, float]
-    why: str
-
-
-@dataclasses.dataclass
-class FitResult:
-    """A fitted material and what is known of it."""
-
-    stack: Stack
-    start: Stack
-    free: Parametrisation
-    vector: np.ndarray
-    start_vector: np.ndarray
-    gram: np.ndarray
-    """J^T J at the solution, in the coordinates of the fit."""
-    uncertainty: Uncertainty
-    held: list[Held]
-    converged: bool
-    cost: float
-    steps: int
-    minima: list[Minimum]
-    notes: list[str]
-    trace: list[Row]
-    models: list[np.ndarray]
-    """Radiance of the fitted material at the usable pixels of each reference."""
-    samples: list[Samples]
-    views: Sequence[View]
-    clock: Clock
-    solve_s: float
 
 
 def fit(
@@ -125,6 +70,8 @@ class _Fit:
         self.explicit = free is not None
         self.notes: list[str] = []
         self.start = start.astype(np.float32)
+        for view in views:
+            view.check(start)
         self.views, self.weights, self.loss, self.starts, self.seed, self.where = views, weights, loss, starts, seed, where
         self.progress = progress
         self.trace: list[Row] = []
@@ -152,6 +99,7 @@ class _Fit:
             self.progress("fine", (k + 1) / ROUNDS)
         held = (u <= self.bounds[0]) | (u >= self.bounds[1])
         uncertainty = estimate(gram, cost, self._residuals(), held, self._parts(u))
+        models = self._models(u)
         clock = CLOCK.since(self.clock)
         return FitResult(
             stack=self._material(u),
@@ -168,7 +116,8 @@ class _Fit:
             minima=minima,
             notes=self.notes,
             trace=self.trace,
-            models=self._models(u),
+            models=models,
+            misfit=misfit(models, self.samples, self._weights(models)),
             samples=self.samples,
             views=self.views,
             clock=clock,
@@ -180,20 +129,24 @@ class _Fit:
 
     def _weigh(self, u: np.ndarray | None) -> None:
         """Set the residual weights from the model at `u`, or equal ones before there is a model."""
-        kind = self.weights if u is not None else "uniform"
-        models = self._models(u) if u is not None else [s.target for s in self.samples]
-        values = []
-        for model, samples in zip(models, self.samples, strict=True):
-            weight = inverse_sigma(model, samples.target, samples.noise, kind)
-            if u is not None and self.loss != "square":
-                weight = weight * robust((model - samples.target) * weight, self.loss)
-            values.append(weight)
+        even = [inverse_sigma(s.target, s.target, None, "uniform") for s in self.samples]
+        values = even if u is None else self._weights(self._models(u))
         weight = channels_first(self.layout.scatter(values, 0.0))
         self.brightness = [
             float(np.sum((w * np.asarray(block.target)).astype(float) ** 2))
             for w, block in zip(weight, self.blocks, strict=True)
         ]
         self.blocks = [_weighted(block, w) for block, w in zip(self.blocks, weight, strict=True)]
+
+    def _weights(self, models: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Weights of the residuals of these models, a reference each."""
+        values = []
+        for model, samples in zip(models, self.samples, strict=True):
+            weight = inverse_sigma(model, samples.target, samples.noise, self.weights)
+            if self.loss != "square":
+                weight = weight * robust((model - samples.target) * weight, self.loss)
+            values.append(weight)
+        return values
 
     def _models(self, u: np.ndarray) -> list[np.ndarray]:
         stack = self._material(u)
@@ -242,10 +195,10 @@ class _Fit:
         names = [f.name for f in blind]
         if self.explicit:
             raise InputError(
-                f"{self.where}.free: {', '.join(names)} has no effect on this image at its start; leave it out, or start where it shows "
-                "(a base below an opaque coat does not)"
+                f"{self.where}.free: {_have_no_effect(names)} at the start; leave {'it' if len(names) == 1 else 'them'} out, or start where "
+                "there is one (a base below an opaque coat has none)"
             )
-        self.notes += [f"{name} has no effect on this image and was held at its start" for name in names]
+        self.notes.append(f"{_have_no_effect(names)} and {'was' if len(names) == 1 else 'were'} held at the start")
         left = [f.name for f in self.free.free if f.name not in names]
         self.start, self.free = parametrise(self.start, left, (), self.where)
         self._set_bounds()
@@ -279,6 +232,10 @@ class _Fit:
             _, state = self._step(at, initial(at, self.solver), blocks)
             parts.append((np.asarray(state.gradient), np.asarray(state.gram)))
         return parts
+
+
+def _have_no_effect(names: Sequence[str]) -> str:
+    return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no effect on this image"
 
 
 def _weighted(block: Block, inverse_sigma: np.ndarray) -> Block:

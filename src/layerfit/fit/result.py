@@ -1,42 +1,137 @@
-"""A fit as a document: what `fit.json` and `--json` hold."""
+"""What a fit gives back: as a record, and as the document that `fit.json` and `--json` hold."""
 
+import dataclasses
+import html
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from .._compiled import Clock
+from ..capture.samples import Samples, View
 from ..preset import left_out, rounded
-from .fit import FitResult
-from .uncertainty import WEAK_SIGMA, in_words
+from ..stack import Stack
+from . import words
+from .parameters import Parametrisation
+from .uncertainty import WEAK_SIGMA, Uncertainty, in_words
 
 SCHEMA = "layerfit/fit"
 VERSION = 1
 REPORTED = 0.5
 """Correlations below this are not listed."""
 
+POOR = 0.1
+"""Misfit that makes a fit poor: twice what the weights expect of a closed form (`weights.MODEL_SHARE`), as a mean over the image."""
+
+NEAR_BOUND = 1e-6
+"""Part of its range within which a value stands at the end of it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One step of the fit, for the convergence trace."""
+
+    time_s: float
+    stage: str
+    start: int
+    step: int
+    error: float
+    """Weighted residual over the weighted image, root of sums of squares, of the pixels in use."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Minimum:
+    """Where one start led."""
+
+    start: int
+    vector: np.ndarray
+    cost: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Held:
+    """A free parameter that was held at its start, because the data cannot tell it from another."""
+
+    direction: dict[str, float]
+    why: str
+
+
+@dataclasses.dataclass
+class FitResult:
+    """A fitted material and what is known of it."""
+
+    stack: Stack
+    start: Stack
+    free: Parametrisation
+    vector: np.ndarray
+    start_vector: np.ndarray
+    gram: np.ndarray
+    """J^T J at the solution, in the coordinates of the fit."""
+    uncertainty: Uncertainty
+    held: list[Held]
+    converged: bool
+    cost: float
+    steps: int
+    minima: list[Minimum]
+    notes: list[str]
+    trace: list[Row]
+    models: list[np.ndarray]
+    """Radiance of the fitted material at the usable pixels of each reference."""
+    misfit: float
+    """Weighted residual over the weighted image, without the noise that the files state."""
+    samples: list[Samples]
+    views: Sequence[View]
+    clock: Clock
+    solve_s: float
+
+    def __repr__(self) -> str:
+        return "\n".join([_heading(self), *words.parameters(parameters(self))])
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return f"<p>{html.escape(_heading(self))}</p>{words.table(parameters(self))}"
+
+
+def _heading(result: FitResult) -> str:
+    found = flags(result, parameters(result), correlations(result))
+    outcome = words.converged(result.converged, result.steps)
+    return f"{words.structure(result.stack)}; converged: {outcome}; flags: {', '.join(found) or 'none'}"
+
 
 def parameters(result: FitResult) -> dict[str, dict[str, Any]]:
     """Every free parameter with its value, start, sigma and state, and the derived optical depths."""
     u, free = result.vector, result.free
-    slopes, sigma = free.slopes(u), result.uncertainty.sigma
-    lower, upper = free.bounds()
-    span = upper - lower
+    slopes, sigma = free.slopes(u), _sigmas(result)
+    low, high = _at_bounds(result)
     values, starts = free.values(u), free.values(result.start_vector)
     rows: dict[str, dict[str, Any]] = {}
     for f in free.free:
         at = list(f.slots)
-        low, high = np.any(u[at] <= lower[at] + 1e-6 * span[at]), np.any(u[at] >= upper[at] - 1e-6 * span[at])
         rows[f.name] = {
             "value": rounded(values[f.name]),
             "start": rounded(starts[f.name]),
             "sigma": _sigma(slopes[at] * sigma[at]),
-            "at_bound": "lower" if low else "upper" if high else None,
-            "identifiable": bool(np.all(sigma[at] < WEAK_SIGMA)),
+            "at_bound": "lower" if np.any(low[at]) else "upper" if np.any(high[at]) else None,
+            "identifiable": not np.any(sigma[at] >= WEAK_SIGMA),
             "unit": f.spec.unit,
         }
     for layer in result.stack.layers:
         if layer.absorption_per_mm is not None:
             rows[f"{layer.name}.tau"] = _derived_tau(result, layer)
     return rows
+
+
+def _at_bounds(result: FitResult) -> tuple[np.ndarray, np.ndarray]:
+    """Which entries of the vector stand at the lower and at the upper end of their range."""
+    lower, upper = result.free.bounds()
+    near = NEAR_BOUND * (upper - lower)
+    return result.vector <= lower + near, result.vector >= upper - near
+
+
+def _sigmas(result: FitResult) -> np.ndarray:
+    """Sigmas in the coordinates of the fit; NaN at a bound, where the data pull one way only and nothing tells how far."""
+    low, high = _at_bounds(result)
+    return np.where(low | high, np.nan, result.uncertainty.sigma)
 
 
 def _sigma(values: np.ndarray) -> Any:
@@ -48,7 +143,7 @@ def _derived_tau(result: FitResult, layer: Any) -> dict[str, Any]:
     """tau = absorption thickness, with the sigma of whichever is fitted."""
     tau = np.broadcast_to(np.asarray(layer.optical_depth, float), 3)
     relative = np.zeros(3)
-    slopes = result.free.slopes(result.vector) * result.uncertainty.sigma
+    slopes = result.free.slopes(result.vector) * _sigmas(result)
     values = result.free.values(result.vector)
     for f in result.free.free:
         if f.name in (f"{layer.name}.absorption_per_mm", f"{layer.name}.thickness_um"):
@@ -83,6 +178,7 @@ def unidentified(result: FitResult) -> list[dict[str, Any]]:
 def flags(result: FitResult, rows: dict[str, dict[str, Any]], pairs: list[list[Any]]) -> list[str]:
     """What a reader should know before using the values; empty for a fit without blemish."""
     found = [] if result.converged else ["not_converged"]
+    found += ["poor_fit"] if result.misfit > POOR else []
     found += [f"at_bound:{name}" for name, row in rows.items() if row.get("at_bound")]
     found += [f"not_identifiable:{name}" for name, row in rows.items() if row.get("identifiable") is False]
     found += [f"correlated:{a}~{b}" for a, b, r in pairs if abs(r) > 0.95]
@@ -107,9 +203,11 @@ def to_json(
         "converged": result.converged,
         "flags": flags(result, rows, pairs),
         "parameters": rows,
+        "sigma_is": words.SIGMA,
         "correlations": pairs,
         "unidentified": unidentified(result),
         "error": error,
+        "misfit": float(f"{result.misfit:.4g}"),
         "parity": parity,
         "model_error": {},
         "time": {key: round(value, 3) for key, value in seconds.items()},

@@ -5,7 +5,11 @@ so that weights made from it, and robust losses on it, pull the fit down. The la
 standard errors where it has them; a share of the value, for what no closed form gets right; and a share of the image's brightness.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
+
+from ..capture.samples import Samples
 
 MODEL_SHARE = 0.05
 """Relative error that is expected of any closed form below a coat."""
@@ -47,3 +51,14 @@ def robust(residual: np.ndarray, loss: str) -> np.ndarray:
     if loss == "cauchy":
         return (1.0 / np.sqrt(1.0 + (size / 2.385) ** 2)).astype(np.float32)
     return np.ones_like(residual, np.float32)
+
+
+def misfit(models: Sequence[np.ndarray], samples: Sequence[Samples], weights: Sequence[np.ndarray]) -> float:
+    """Weighted residual over the weighted image, roots of sums of squares, without the noise that the files state."""
+    residual = noise = image = 0.0
+    for model, seen, weight in zip(models, samples, weights, strict=True):
+        residual += np.sum(((model - seen.target) * weight).astype(float) ** 2)
+        image += np.sum((seen.target * weight).astype(float) ** 2)
+        if seen.noise is not None:
+            noise += np.sum((noise_law(np.maximum(model, 0.0), seen.noise) * weight).astype(float) ** 2)
+    return float(np.sqrt(max(residual - noise, 0.0) / image))

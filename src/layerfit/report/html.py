@@ -5,7 +5,8 @@ import html
 from collections.abc import Mapping
 from typing import Any
 
-from .text import image_error, lines, measured, number, relative, states
+from ..fit import words
+from .text import image_error, lines, relative
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #18181b; --paper: #fafafa; --line: #d4d4d8; --soft: #71717a; }
@@ -20,7 +21,6 @@ td:nth-child(n+2) { font-variant-numeric: tabular-nums; } pre { overflow-x: auto
 
 def page(name: str, document: Mapping[str, Any], picture: bytes, convergence: bytes, shader: str) -> str:
     """The report as HTML with its pictures inside; it makes no request."""
-    rows = "".join(_row(key, row) for key, row in document["parameters"].items())
     text = html.escape("\n".join(lines(document)))
     return f"""<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -31,7 +31,8 @@ def page(name: str, document: Mapping[str, Any], picture: bytes, convergence: by
 <figcaption class=soft>All at one exposure: the 99th percentile of the reference is white. The difference is that of the shader from the
 reference, where pixels are compared.</figcaption></figure>
 <h2>Parameters</h2>
-<table><tr><th>parameter</th><th>value</th><th>sigma</th><th>unit</th><th>start</th><th></th></tr>{rows}</table>
+{words.table(document["parameters"])}
+<p class=soft>Sigmas are {html.escape(document["sigma_is"])}.</p>
 <h2>Error against run time</h2>
 <figure><img alt="error of the fit against seconds" src="data:image/png;base64,{base64.b64encode(convergence).decode()}">
 <figcaption class=soft>One line a start. Coarse and polish use few pixels, fine all of them with weights that follow the model.</figcaption></figure>
@@ -41,18 +42,12 @@ reference, where pixels are compared.</figcaption></figure>
 """
 
 
-def _row(name: str, row: Mapping[str, Any]) -> str:
-    value, sigma = measured(row["value"], row["sigma"])
-    unit, start = row.get("unit", "1").replace("1", ""), number(row["start"]) if "start" in row else ""
-    cells = f"<th>{html.escape(name)}</th><td>{value}</td><td>&plusmn; {sigma}</td><td>{html.escape(unit)}</td>"
-    return f"<tr>{cells}<td class=soft>{start}</td><td>{html.escape(', '.join(states(row)))}</td></tr>"
-
-
 def _verdict(document: Mapping[str, Any]) -> str:
     """The result in a sentence."""
     parity = document["parity"]
+    poor = f" {words.poor(document['misfit'])}" if "poor_fit" in document["flags"] else ""
     return (
-        f"The fit {'converged' if document['converged'] else 'did NOT converge'}; its error is {image_error(document['error'])}. "
+        f"The fit {'converged' if document['converged'] else 'did NOT converge'}; its error is {image_error(document['error'])}.{poor} "
         f"The shader {'is' if parity['passed'] else 'is NOT'} the fitted material: "
         f"the largest relative difference from JAX is {relative(parity['max_rel'])}."
     )

@@ -1,10 +1,11 @@
 """The report of a fit in the terminal: lmfit's blocks, with what an image can and cannot tell beside them."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
+from ..fit import words
 
 
 def lines(document: Mapping[str, Any]) -> list[str]:
@@ -15,7 +16,7 @@ def lines(document: Mapping[str, Any]) -> list[str]:
     out += _rows(
         {
             "model": f"{d['model']['layers']}, {d['model']['name']} form{_options(d['model']['options'])}",
-            "converged": f"{'yes' if d['converged'] else 'NO'}, after {d['steps']} steps",
+            "converged": words.converged(d["converged"], d["steps"]),
             "flags": ", ".join(d["flags"]) or "none",
             "error": image_error(d["error"]),
             "pixels": f"{_pixels(pixels)}{_dropped(pixels['dropped'])}",
@@ -24,10 +25,10 @@ def lines(document: Mapping[str, Any]) -> list[str]:
             "starts": f"{d['starts']}, of which {_same_minimum(d['minima'])} reached this minimum",
         }
     )
-    out += [
-        "[[Parameters]] (sigma: scatter of the residuals and of parts of the image; what the model cannot follow is not in it)"
-    ]
-    out += [_parameter(name, row) for name, row in d["parameters"].items()]
+    if "poor_fit" in d["flags"]:
+        out += [f"    {words.poor(d['misfit'])}"]
+    out += [f"[[Parameters]] (sigmas are {d['sigma_is']})"]
+    out += words.parameters(d["parameters"])
     if d["correlations"]:
         out += ["[[Correlations]] (below 0.5 are not listed)"]
         out += [f"    C({a}, {b}) = {r:+.3f}" for a, b, r in d["correlations"][:12]]
@@ -82,42 +83,6 @@ def worst(place: Mapping[str, Any]) -> str:
 
 def _rows(rows: Mapping[str, str]) -> list[str]:
     return [f"    {key + ':':<12} {value}" for key, value in rows.items()]
-
-
-def _parameter(name: str, row: Mapping[str, Any]) -> str:
-    value, sigma = measured(row["value"], row["sigma"])
-    unit = f" {row['unit']}" if row.get("unit", "1") != "1" else ""
-    notes = [f"start {number(row['start'])}"] if "start" in row else []
-    return f"    {name + ':':<26} {value} +/- {sigma}{unit}  ({', '.join([*notes, *states(row)])})"
-
-
-def states(row: Mapping[str, Any]) -> list[str]:
-    """What a reader should know of a parameter."""
-    found = [f"at its {row['at_bound']} bound"] if row.get("at_bound") else []
-    found += ["not identifiable"] if row.get("identifiable") is False else []
-    return found + ([f"= {row['derived']}"] if "derived" in row else [])
-
-
-def number(value: Any) -> str:
-    """A value, a colour or an unknown, in four digits."""
-    if value is None:
-        return "unknown"
-    if isinstance(value, list):
-        return "[" + ", ".join(number(v) for v in value) + "]"
-    return f"{value:.4g}"
-
-
-def measured(value: Any, sigma: Any) -> tuple[str, str]:
-    """A value with the digits that its sigma leaves it, seven at most, and the sigma in two."""
-    if isinstance(value, list):
-        pairs = [measured(v, s) for v, s in zip(value, sigma if isinstance(sigma, list) else [sigma] * len(value), strict=True)]
-        values, sigmas = ("[" + ", ".join(column) + "]" for column in zip(*pairs, strict=True))
-        return values, sigmas
-    if not sigma or not value:
-        return number(value), number(sigma)
-    wanted = 1 - math.floor(math.log10(sigma))
-    decimals = max(min(wanted, 6 - math.floor(math.log10(abs(value)))), 0)
-    return f"{value:.{decimals}f}", f"{sigma:.{decimals}f}" if decimals == wanted else f"{sigma:.2g}"
 
 
 def _options(options: Mapping[str, Any]) -> str:

@@ -1,0 +1,91 @@
+"""A fit in words: what the terminal, the report page and a notebook say alike."""
+
+import html
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ..stack import Stack
+
+SIGMA = (
+    "of noise and scatter, not of what the form of the model gets wrong: a value can be further from the truth than its sigma"
+)
+"""What the sigmas are of."""
+
+NONE = "\N{EN DASH}"
+"""In place of a number that there is none of."""
+
+
+def structure(stack: Stack) -> str:
+    """The layers of a material, outermost first."""
+    return " over ".join(type(layer).__name__ for layer in (*stack.layers, stack.base))
+
+
+def converged(yes: bool, steps: int) -> str:
+    """Whether a fit came to its end."""
+    return f"{'yes' if yes else 'NO'}, after {steps} steps"
+
+
+def parameters(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """A line each: value, sigma, unit, and what a reader should know of it."""
+    return [_line(name, row) for name, row in rows.items()]
+
+
+def _line(name: str, row: Mapping[str, Any]) -> str:
+    value, sigma = measured(row["value"], row["sigma"])
+    notes = [f"start {number(row['start'])}"] if "start" in row else []
+    return f"    {name + ':':<26} {value} +/- {sigma}{_unit(row, ' ')}  ({', '.join([*notes, *states(row)])})"
+
+
+def table(rows: Mapping[str, Mapping[str, Any]]) -> str:
+    """The same as an HTML table."""
+    heads = "".join(f"<th>{head}</th>" for head in ("parameter", "value", "sigma", "unit", "start", ""))
+    return f"<table><tr>{heads}</tr>{''.join(_row(name, row) for name, row in rows.items())}</table>"
+
+
+def _row(name: str, row: Mapping[str, Any]) -> str:
+    value, sigma = measured(row["value"], row["sigma"])
+    cells = f"<th>{html.escape(name)}</th><td>{value}</td><td>&plusmn; {sigma}</td><td>{html.escape(_unit(row))}</td>"
+    start = number(row["start"]) if "start" in row else ""
+    return f"<tr>{cells}<td class=soft>{start}</td><td>{html.escape(', '.join(states(row)))}</td></tr>"
+
+
+def _unit(row: Mapping[str, Any], before: str = "") -> str:
+    return before + row["unit"] if row.get("unit", "1") != "1" else ""
+
+
+def states(row: Mapping[str, Any]) -> list[str]:
+    """What a reader should know of a parameter."""
+    found = [f"at its {row['at_bound']} bound"] if row.get("at_bound") else []
+    found += ["not identifiable"] if row.get("identifiable") is False else []
+    return found + ([f"= {row['derived']}"] if "derived" in row else [])
+
+
+def number(value: Any) -> str:
+    """A value or a colour in four digits, or a dash."""
+    if value is None:
+        return NONE
+    if isinstance(value, list):
+        return "[" + ", ".join(number(v) for v in value) + "]"
+    return f"{value:.4g}"
+
+
+def measured(value: Any, sigma: Any) -> tuple[str, str]:
+    """A value with the digits that its sigma leaves it, seven at most, and the sigma in two."""
+    if isinstance(value, list):
+        pairs = [measured(v, s) for v, s in zip(value, sigma if isinstance(sigma, list) else [sigma] * len(value), strict=True)]
+        values, sigmas = ("[" + ", ".join(column) + "]" for column in zip(*pairs, strict=True))
+        return values, sigmas
+    if not sigma or not value:
+        return number(value), number(sigma)
+    wanted = 1 - math.floor(math.log10(sigma))
+    decimals = max(min(wanted, 6 - math.floor(math.log10(abs(value)))), 0)
+    return f"{value:.{decimals}f}", f"{sigma:.{decimals}f}" if decimals == wanted else f"{sigma:.2g}"
+
+
+def poor(misfit: float) -> str:
+    """What a poor fit means, in a sentence."""
+    return (
+        f"The model misses {100.0 * misfit:.0f} % of the image. Check camera, lights and channels, then whether the material has these "
+        "layers; its values say little."
+    )
