@@ -17,6 +17,7 @@ import numpy as np
 
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
+from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
 from layerfit.stack import Stack, evaluate
 from layerfit.surfaces import Conductor, Dielectric, Lambert, OrenNayar
@@ -139,6 +140,12 @@ STACKS: dict[str, Stack] = {
     "corrected, absorption and thickness": Stack(
         (Coat(alpha=0.1, eta=1.5, absorption_per_mm=[1.0, 4.0, 12.0], thickness_um=50.0),), Conductor(alpha=0.2, **COPPER)
     ),
+    "precise over conductor": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Precise()),
+    "precise, narrow": Stack((varnish(alpha=0.02),), Conductor(alpha=0.02, **COPPER), Precise()),
+    "precise, rough and conserving": Stack((varnish(alpha=0.5, eta=1.7),), Conductor(alpha=0.4, **COPPER), Precise("multi")),
+    "precise, clear coat": Stack((varnish(tau=None),), Conductor(alpha=0.2, **COPPER), Precise()),
+    "precise over lambert": Stack((varnish(),), Lambert(albedo=[0.5, 0.28, 0.13]), Precise()),
+    "precise over oren_nayar": Stack((varnish(alpha=0.3),), OrenNayar(albedo=[0.5, 0.28, 0.13]), Precise("multi")),
     "faithful over conductor": Stack((varnish(masking="vcavity"),), Conductor(alpha=0.2, **COPPER), Faithful()),
     "faithful at the normal": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Faithful("n", "n")),
     "faithful over lambert": Stack((varnish(),), Lambert(albedo=[0.5, 0.28, 0.13]), Faithful()),

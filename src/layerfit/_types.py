@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float
 Scalar = Float[Array, ""]
 Flag = Bool[Array, ""]
 Vec3 = Float[Array, "3"]
+Vec4 = Float[Array, "4"]
 Colour = Float[Array, ""] | Float[Array, "3"]
 
 Number = Any

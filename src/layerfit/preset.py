@@ -19,14 +19,16 @@ from .documents import check_keys, nearest, read_document, write_text
 from .errors import InputError
 from .forms.corrected import Corrected
 from .forms.faithful import Faithful
+from .forms.precise import Precise, refuses
 from .layers import LAYERS
 from .stack import Stack
 from .surfaces import BASES
 
 SCHEMA = "layerfit/preset"
 VERSION = 1
-MODELS: dict[str, type] = {"corrected": Corrected, "faithful": Faithful}
-_STACK_KEYS = ("model", "options", "layers", "base")
+MODELS: dict[str, type] = {"precise": Precise, "corrected": Corrected, "faithful": Faithful}
+FORM_KEYS = ("model", "interface", "options")
+_STACK_KEYS = (*FORM_KEYS, "layers", "base")
 _PRESET_KEYS = ("schema", "version", "name", *_STACK_KEYS, "left_out", "fit")
 
 
@@ -69,8 +71,10 @@ def preset_of(stack: Stack, name: str, **more: Any) -> dict[str, Any]:
     changed = {
         field.name: getattr(stack.form, field.name)
         for field in dataclasses.fields(stack.form)
-        if getattr(stack.form, field.name) != field.default
+        if field.name != "interface" and getattr(stack.form, field.name) != field.default
     }
+    if isinstance(stack.form, Precise):
+        document["interface"] = stack.form.interface
     if changed:
         document["options"] = changed
     document["layers"] = [_layer_document(layer, LAYERS) for layer in stack.layers]
@@ -104,14 +108,8 @@ def left_out(stack: Stack) -> list[str]:
 
 
 def stack_of(document: Mapping[str, Any], where: str) -> Stack:
-    """The material of `model`, `options`, `layers` and `base` keys; `where` is named in messages."""
+    """The material of `model`, `interface`, `options`, `layers` and `base` keys; `where` is named in messages."""
     check_keys(document, _STACK_KEYS, where)
-    model = document.get("model", "corrected")
-    if model not in MODELS:
-        raise InputError(f"{where}: model = {model!r} is not one of {', '.join(MODELS)}{nearest(str(model), MODELS)}")
-    form = MODELS[model]
-    options = document.get("options", {})
-    check_keys(options, [f.name for f in dataclasses.fields(form)], f"{where}: options")
     layers = document.get("layers", [])
     if not isinstance(layers, Sequence) or isinstance(layers, str):
         raise InputError(f"{where}: layers should be a list, outermost first")
@@ -122,7 +120,33 @@ def stack_of(document: Mapping[str, Any], where: str) -> Stack:
     names = [layer.name for layer in (*built, base)]
     if len(set(names)) < len(names):
         raise InputError(f"{where}: two layers share a name ({', '.join(names)}); names tell parameters apart")
-    return Stack(built, base, form(**options))
+    return Stack(built, base, form_of(document, built, base, where))
+
+
+def form_of(document: Mapping[str, Any], layers: tuple[Any, ...], base: Any, where: str) -> Any:
+    """The form of `model`, `interface` and `options`; without a model the precise one, for materials that it is for."""
+    reason = refuses(layers, base)
+    model = document.get("model", "corrected" if reason else "precise")
+    if model not in MODELS:
+        raise InputError(f"{where}: model = {model!r} is not one of {', '.join(MODELS)}{nearest(str(model), MODELS)}")
+    if model == "precise" and reason:
+        raise InputError(
+            f'{where}: model = "precise" is not for this material: {reason}. Use "corrected", which is for all of them'
+        )
+    form = MODELS[model]
+    options = dict(document.get("options", {}))
+    known = [f.name for f in dataclasses.fields(form) if f.name != "interface"]
+    check_keys(options, known, f"{where}: options")
+    if "interface" in document:
+        interface = document["interface"]
+        if model != "precise":
+            raise InputError(f'{where}: interface is of model = "precise"; {model} has no choice of it')
+        if interface not in ("single", "multi"):
+            raise InputError(
+                f"{where}: interface = {interface!r} should be single or multi{nearest(str(interface), ('single', 'multi'))}"
+            )
+        options["interface"] = interface
+    return form(**options)
 
 
 def _layer(document: Any, kinds: Mapping[str, type], where: str) -> Any:

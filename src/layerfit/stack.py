@@ -8,11 +8,11 @@ import jax.numpy as jnp
 
 from ._chunk import static, struct
 from ._types import Colour, Vec3
-from .forms import corrected, faithful
+from .forms import corrected, faithful, precise
 from .layers import Coat
 
-Form = faithful.Faithful | corrected.Corrected
-FORMS = {faithful.Faithful: faithful, corrected.Corrected: corrected}
+Form = faithful.Faithful | corrected.Corrected | precise.Precise
+FORMS = {faithful.Faithful: faithful, corrected.Corrected: corrected, precise.Precise: precise}
 
 
 @struct
@@ -43,7 +43,7 @@ class Stack:
 
 def evaluate(form: Form, prepared: Any, wi: Vec3, wo: Vec3) -> Colour:
     """BRDF [1/sr] of a prepared material for unit directions in the surface frame; 0 below the surface."""
-    if isinstance(prepared, (faithful.Prepared, corrected.Prepared)):
+    if isinstance(prepared, (faithful.Prepared, corrected.Prepared, precise.Prepared)):
         return FORMS[type(form)].evaluate(prepared, wi, wo, form)
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..documents import check_keys, nearest, read_document
 from ..errors import InputError
-from ..preset import read_preset, stack_of
+from ..preset import FORM_KEYS, form_of, read_preset, stack_of
 from ..stack import Stack
 
 Vector = tuple[float, float, float]
@@ -182,12 +182,11 @@ def _start(material: Any, path: Path) -> Stack:
         raise InputError(f"{where}: should be a table of keys, not {material!r}")
     if "preset" not in material:
         return stack_of(material, where)
-    check_keys(material, ("preset", "model", "options"), where)
+    check_keys(material, ("preset", *FORM_KEYS), where)
     stack = read_preset(path.parent / _text(material["preset"], f"{where}.preset"))
-    if "model" not in material:
+    if not any(key in material for key in FORM_KEYS):
         return stack
-    form = {key: material[key] for key in ("model", "options") if key in material}
-    return dataclasses.replace(stack, form=stack_of(form | {"base": {"type": "lambert"}}, where).form)
+    return dataclasses.replace(stack, form=form_of(material, stack.layers, stack.base, where))
 
 
 def _fit(table: Any, where: str) -> FitRequest:

@@ -13,6 +13,7 @@ from .. import __version__
 from .._chunk import CHUNKS
 from .._data import shaders
 from .._fields import params
+from ..forms.precise import BAKED, Precise
 from ..preset import left_out, model_name
 from ..stack import Stack, evaluate
 from .printer import PREFIX, Printer
@@ -72,18 +73,22 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
     printer = Printer(CHUNKS)
     w = jnp.array([0.0, 0.0, 1.0], jnp.float32)
     if uniforms:
-        given = _uniforms(stack)
+        rows, leaves = _uniforms(stack), jax.tree.leaves(stack)
+        given = [row for row in rows if row]
         declarations = "".join(f"uniform {kind} {name};  // {note}\n" for _, name, kind, note in given)
         values = {name: np.asarray(leaf) for leaf, name, _, _ in given}
         structure = jax.tree.structure(stack)
 
         def local(*args: Any) -> Any:
-            live: Stack = jax.tree.unflatten(structure, args[:-2])
+            free = iter(args[:-2])
+            values = [next(free) if row else leaf for row, leaf in zip(rows, leaves, strict=True)]
+            live: Stack = jax.tree.unflatten(structure, values)
             return jnp.broadcast_to(evaluate(live.form, live.prepare(), *args[-2:]), (3,))
 
         outside = [(leaf, name) for leaf, name, _, _ in given]
     else:
-        prepared = jax.tree.map(np.asarray, jax.jit(Stack.prepare)(stack))
+        with jax.enable_x64(False):
+            prepared = jax.tree.map(np.asarray, jax.jit(Stack.prepare)(stack))
         outside = [(part, f"{PREFIX}{name}") for name, part in _parts(stack, prepared)]
         declarations = "\n".join(printer.constant(name, part) for part, name in outside)
         values = {}
@@ -112,20 +117,26 @@ def _parts(stack: Stack, prepared: Any) -> list[tuple[str, Any]]:
             for layer, item in zip(stack.layers, value, strict=True):
                 own = isinstance(item, type(layer))
                 parts.append((layer.name if own else f"{layer.name}_{type(item).__name__.lower()}", item))
-        elif dataclasses.is_dataclass(value):
+        elif isinstance(value, type(stack.base)):
             parts.append((stack.base.name, value))
+        elif dataclasses.is_dataclass(value):
+            coat = stack.layers[0].name
+            parts.append((coat if isinstance(value, type(stack.layers[0])) else f"{coat}_{field.name}", value))
         elif value is not None:
             parts.append((f"{stack.base.name}_{field.name}", value))
     return parts
 
 
-def _uniforms(stack: Stack) -> list[tuple[Any, str, str, str]]:
-    """Every number of the material as (value, uniform, type, comment), in the order of its leaves."""
-    rows = []
+def _uniforms(stack: Stack) -> list[tuple[Any, str, str, str] | None]:
+    """Every number of the material as (value, uniform, type, comment), in the order of its leaves; None for what is baked."""
+    rows: list[tuple[Any, str, str, str] | None] = []
+    baked = stack.layers[0] if isinstance(stack.form, Precise) else None
     for layer in (*stack.layers, stack.base):
         for field, spec in params(layer):
             value = getattr(layer, field)
-            if value is not None:
+            if layer is baked and field in BAKED:
+                rows.append(None)
+            elif value is not None:
                 note = f"{spec.doc}, {spec.lower:g} to {spec.upper:g} {'' if spec.unit == '1' else spec.unit}".rstrip()
                 rows.append((value, f"u_{layer.name}_{field}", "vec3" if value.ndim else "float", note))
     return rows
