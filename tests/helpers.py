@@ -141,7 +141,7 @@ STACKS: dict[str, Stack] = {
         (Coat(alpha=0.1, eta=1.5, absorption_per_mm=[1.0, 4.0, 12.0], thickness_um=50.0),), Conductor(alpha=0.2, **COPPER)
     ),
     "precise over conductor": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Precise()),
-    "precise, narrow": Stack((varnish(alpha=0.02),), Conductor(alpha=0.02, **COPPER), Precise()),
+    "precise, narrow": Stack((varnish(alpha=0.025),), Conductor(alpha=0.02, **COPPER), Precise()),
     "precise, rough and conserving": Stack((varnish(alpha=0.5, eta=1.7),), Conductor(alpha=0.4, **COPPER), Precise("multi")),
     "precise, clear coat": Stack((varnish(tau=None),), Conductor(alpha=0.2, **COPPER), Precise()),
     "precise over lambert": Stack((varnish(),), Lambert(albedo=[0.5, 0.28, 0.13]), Precise()),
