@@ -52,6 +52,8 @@ def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any) -> Any:
 
 _compiled = Compiled(channels)
 _BLOCK = 1024
+_LIGHTS = 512
+"""Light samples that are summed at once: the quadratures of a fit and of its pictures then share one executable."""
 
 
 def block_size(lights: int) -> int:
@@ -63,16 +65,24 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) ->
     """Linear radiance (n, 3) of any number of pixels, computed in float32 and block by block.
 
     `wi` and `weight` are (n, s, 3) for s light samples a pixel, channels last, and `wo` is (n, 3). Materials of the same structure share
-    one executable for each s.
+    one executable for each s up to 512, and beyond it for equal parts of s.
     """
-    size = block_size(wi.shape[1])
+    pieces = -(-wi.shape[1] // _LIGHTS)
+    each = -(-wi.shape[1] // pieces)
+    if missing := pieces * each - wi.shape[1]:
+        wi = np.pad(wi, ((0, 0), (0, missing), (0, 0)), "edge")
+        weight = np.pad(weight, ((0, 0), (0, missing), (0, 0)))
+    size = block_size(each)
     stack = stack.astype(np.float32)
     rows = []
     with jax.enable_x64(False):
         for start in range(0, len(wo), size):
-            part = [_padded(a[start : start + size], size) for a in (wi, wo, weight)]
-            part[2] = np.moveaxis(part[2], -1, 0)
-            rows.append(np.asarray(_compiled(stack, *part)).T)
+            to_light, to_eye, bright = (_padded(a[start : start + size], size) for a in (wi, wo, weight))
+            bright = np.moveaxis(bright, -1, 0)
+            lights = [slice(light, light + each) for light in range(0, pieces * each, each)]
+            # All are started before the first is waited for.
+            sums = [_compiled(stack, to_light[:, some], to_eye, bright[:, :, some]) for some in lights]
+            rows.append(np.sum([np.asarray(part) for part in sums], 0).T)
     return np.concatenate(rows)[: len(wo)]
 
 

@@ -15,7 +15,7 @@ from ..render import predict
 from ..stack import Stack
 from .blocks import Block, arrange, channels_first
 from .parameters import Parametrisation, parametrise, with_fixed
-from .residuals import NEAR, initial, scaled, step
+from .residuals import NEAR, initial, parts, scaled, step
 from .result import FitResult, Held, Minimum, Row
 from .solve import NormalLevenbergMarquardt
 from .uncertainty import GROUPS, estimate
@@ -222,16 +222,9 @@ class _Fit:
     def _parts(self, u: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Gradient and J^T J of parts of the image: sectors around the highlight, each with a share of every half angle."""
         sector = self.layout.scatter([_sectors(samples, GROUPS) for samples in self.samples], -1.0)
-        at = np.asarray(u)
-        parts = []
-        for g in range(GROUPS):
-            blocks = [
-                _weighted(block, np.where(where == g, block.inverse_sigma, np.float32(0.0)))
-                for block, where in zip(self.blocks, sector, strict=True)
-            ]
-            _, state = self._step(at, initial(at, self.solver), blocks)
-            parts.append((np.asarray(state.gradient), np.asarray(state.gram)))
-        return parts
+        groups = sector == np.arange(GROUPS)[:, None, None]
+        found = parts(u, self.start, self.blocks, groups, free=self.free)
+        return [(np.asarray(gradient), np.asarray(gram)) for _, (gradient, gram) in found]
 
 
 def _have_no_effect(names: Sequence[str]) -> str:

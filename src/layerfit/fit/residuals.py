@@ -14,7 +14,7 @@ from ..render import channels
 from ..stack import Stack
 from .blocks import Block
 from .parameters import Parametrisation
-from .solve import columns, normal_equations, products
+from .solve import Normal, columns, normal_equations, products
 
 
 def scaled(stack: Stack, scale: Any) -> Stack:
@@ -65,6 +65,17 @@ def step(
     started = [_block_columns(trial, start, block, free=free) for block in blocks]
     total = np.sum([products(part) for part in started], 0)
     return _solver_step(u, state, bounds, total, free=free, solver=solver)
+
+
+def parts(u: Any, start: Stack, blocks: Sequence[Block], groups: np.ndarray, *, free: Parametrisation) -> list[Normal]:
+    """Normal equations of groups of pixels, from one evaluation of the model at `u`; `groups` (groups, blocks, pixels) are masks."""
+    slots = tuple(f.slots for f in free.free)
+    evaluated = [_block_columns(np.asarray(u).astype(np.float32), start, block, free=free) for block in blocks]
+    evaluated = [[np.asarray(column) for column in part] for part in evaluated]
+    return [
+        normal_equations(np.sum([products([c * m for c in part]) for part, m in zip(evaluated, mask, strict=True)], 0), slots)
+        for mask in groups
+    ]
 
 
 NEAR = 1e4
