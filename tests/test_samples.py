@@ -6,7 +6,7 @@ from PIL import Image
 
 from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import camera_rays, frames, sphere_surface, sphere_tangent
-from layerfit.capture.lights import receive
+from layerfit.capture.lights import HALF_VECTOR_WIDTHS, _half_vector_pdf, receive
 from layerfit.capture.samples import load_reference
 from layerfit.capture.scene import Camera, Constant, Directional, EnvironmentMap, Point, Reference, Sphere, SphereLight
 from layerfit.errors import InputError
@@ -93,6 +93,33 @@ def test_exact_lights():
     normal, light = received(Point((0.0, 0.0, 2.0), (4.0, 4.0, 4.0)))
     np.testing.assert_allclose(light.weight[:, 0, 0], normal[:, 2], rtol=1e-12)
     assert received(Point((0.0, 0.0, 2.0), (4.0, 4.0, 4.0)), count=3)[1].weight.shape[1] == 3
+
+
+def test_light_is_the_same_however_many_points_ask_for_it(monkeypatch):
+    """Points are worked on in blocks; exact lights do not depend on them, and a quadrature keeps its mean."""
+    whole = received(Constant((1.0, 1.0, 1.0)), samples=64)[1]
+    monkeypatch.setattr("layerfit.capture.lights.CACHED", 640)
+    normal, blocks = received(Constant((1.0, 1.0, 1.0)), samples=64)
+    assert blocks.weight.shape == whole.weight.shape
+    np.testing.assert_array_equal(blocks.weight[:10, :16], whole.weight[:10, :16])  # of the cosine lobe, which is drawn first
+    assert np.ptp(blocks.to_light[:20, 0] @ [1.0, 2.0, 3.0]) > 0.0, "each block has draws of its own"
+    assert np.mean(blocks.weight[..., 0].sum(1)) == pytest.approx(np.pi, rel=0.02)
+    exact = received(Directional((0.0, 0.0, 1.0), (1.0, 2.0, 3.0)), samples=64)[1]
+    np.testing.assert_allclose(exact.weight[:, 0], normal[:, 2:] * [1.0, 2.0, 3.0])
+
+
+def test_half_vectors_are_drawn_as_often_as_their_density_says():
+    """The density of the mixture integrates to one over what is drawn below the horizon and above it."""
+    wo = np.array([[0.6, 0.0, 0.8]])
+    z, phi = np.meshgrid((np.arange(800) + 0.5) / 400 - 1.0, (np.arange(800) + 0.5) / 800 * 2.0 * np.pi)
+    s = np.sqrt(1.0 - z * z)
+    sphere = np.stack([s * np.cos(phi), s * np.sin(phi), z], -1).reshape(1, -1, 3)
+    total = _half_vector_pdf(sphere, wo).sum() * 4.0 * np.pi / sphere.shape[1]
+    widths = np.array(HALF_VECTOR_WIDTHS)[:, None, None]
+    tan2, angle = np.meshgrid(np.linspace(0.0, 1.0, 2001)[:-1], (np.arange(64) + 0.5) / 64 * 2.0 * np.pi)
+    tan = widths * np.sqrt(tan2 / (1.0 - tan2))
+    below = (0.6 * tan * np.cos(angle) + 0.8) <= 0.0  # normals that face away from the viewer reflect nothing
+    assert total == pytest.approx(3.0 - below.mean((1, 2)).sum(), rel=2e-3)
 
 
 def test_constant_light_is_pi():

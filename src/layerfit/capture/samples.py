@@ -105,7 +105,7 @@ class View:
         received = receive(self.reference.lights, self.position[which], normal, view, quadrature, seed)
         to_surface = frames(normal, None if self.tangent is None else self.tangent[which])
         return Samples(
-            wi=np.einsum("nij,nsj->nsi", to_surface, received.to_light).astype(np.float32),
+            wi=(received.to_light @ to_surface.swapaxes(1, 2)).astype(np.float32),
             wo=np.einsum("nij,nj->ni", to_surface, view).astype(np.float32),
             weight=received.weight.astype(np.float32),
             target=self.target[which].astype(np.float32),
