@@ -280,13 +280,13 @@ class Body:
     def _loop(self, eqn: Any, operands: list[Value]) -> list[Value]:
         """A scan of fixed length over constant rows of numbers, as a counted loop."""
         p = eqn.params
-        closed, carries = p["jaxpr"], p["num_carry"]
+        closed, (constants, carries) = p["jaxpr"], _scan_sizes(p)
         if len(closed.jaxpr.outvars) != carries or p["reverse"]:
             raise PrintError(f"{self._where(eqn)}: only a forward scan without stacked outputs prints as a loop")
         outer, carry, rows = (
-            operands[: p["num_consts"]],
-            operands[p["num_consts"] : p["num_consts"] + carries],
-            operands[p["num_consts"] + carries :],
+            operands[:constants],
+            operands[constants : constants + carries],
+            operands[constants + carries :],
         )
         kinds = [glsl_type(v.aval) for v in closed.jaxpr.outvars]
         state = []
@@ -355,3 +355,11 @@ def _struct_text(struct: StructType) -> str:
     width = max(len(kind) + len(name) for name, kind, _ in struct.fields) + 2
     rows = [(f"{kind} {name};", comment) for name, kind, comment in struct.fields]
     return f"struct {struct.name} {{\n" + "".join(f"    {text:<{width}}  // {note}\n" for text, note in rows) + "};\n"
+
+
+def _scan_sizes(params: Mapping[str, Any]) -> tuple[int, int]:
+    """How many operands of a scan are constants and how many are carried: two numbers in JAX 0.10, a tree in 0.12."""
+    if "num_carry" in params:
+        return params["num_consts"], params["num_carry"]
+    constants, carried, _ = params["ft_in"].unpack()
+    return len(constants.vals), len(carried.vals)
