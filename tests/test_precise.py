@@ -1,0 +1,246 @@
+"""The precise form: its values with linear tables, its tables in use, its distance from the random walk, its derivatives."""
+
+import functools
+import json
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from helpers import COPPER, STACKS, brdf_rows, hemisphere
+from layerfit.errors import InputError
+from layerfit.forms import curves, precise, tables
+from layerfit.forms.precise import Crossing, Precise, refuses
+from layerfit.layers import Coat
+from layerfit.optics.interface import facet_cosine, facet_tilt, rough_transmittance, second_facet
+from layerfit.preset import preset_of, stack_of
+from layerfit.stack import Stack
+from layerfit.surfaces import Conductor, Dielectric, Lambert, OrenNayar
+
+PRECISE = [name for name in STACKS if name.startswith("precise")]
+
+
+def linear(x, nodes):
+    """Weights of the values at `nodes` in their linear interpolant at x."""
+    x = np.clip(x, nodes[0], nodes[-1])
+    k = min(np.searchsorted(nodes, x, side="right") - 1, len(nodes) - 2)
+    weight = np.zeros(len(nodes))
+    weight[k + 1] = (x - nodes[k]) / (nodes[k + 1] - nodes[k])
+    weight[k] = 1.0 - weight[k + 1]
+    return weight
+
+
+class Linear:
+    """What an interface does, by linear look-up of given tables."""
+
+    def __init__(self, values, eta, alpha, const):
+        self.tables = {key: np.array(value) for key, value in values.items()}
+        self.eta, self.alpha, self.const = eta, alpha, const
+
+    def look(self, name, x, nodes="mu"):
+        t = self.tables
+        plane = np.einsum("e,a,eam->m", linear(self.eta, t["eta"]), linear(self.alpha, t["alpha"]), t[name])
+        return plane @ linear(x, t[nodes])
+
+    def cross(self, w):
+        w, eta = np.array(w), self.eta
+        mu, sine = w[2], np.hypot(w[0], w[1])
+        closed = rough_transmittance(
+            facet_cosine(jnp.asarray(w), facet_tilt(jnp.asarray(self.alpha))),
+            jnp.asarray(eta),
+            second_facet(jnp.asarray(self.alpha)),
+        )
+        T = np.clip(float(closed) + self.look("dT", mu), 0.0, 1.0)
+        bent = min(sine / eta * (1.0 + self.const["st"] * (self.look("rx", mu) - 1.0)), 0.9998)
+        xy = bent * w[:2] / max(sine, 1e-30)
+        spread = self.const["wid"] * self.look("w", mu) * self.alpha
+        R = self.look("Rb", np.sqrt(1.0 - (sine / eta) ** 2), "mu_below")
+        values = T, spread, 1.0 + self.look("kt", mu), np.exp(self.look("lt", mu)), R
+        return Crossing(jnp.array([*xy, np.sqrt(1.0 - bent**2)]), *map(jnp.asarray, values))
+
+    def returned(self, tau):
+        x, weight = np.polynomial.legendre.leggauss(64)
+        x = 0.5 * (x + 1.0)
+        return float(
+            sum(w * u * np.exp(-2.0 * tau / u) * self.look("Rb", u, "mu_below") for u, w in zip(x, weight, strict=True))
+        )
+
+
+def constants(const, patch):
+    """The constants that the values were computed with, in place of the module's own."""
+    names = {"P": "P", "WIDTH": "wid", "CONDENSE": "cond", "RISE": "ka", "RATIO": "rs", "TAIL": "tl"}
+    for name, key in names.items():
+        patch.setattr(precise, name, const[key])
+    patch.setattr(precise, "DIRECT", tuple(const[k] for k in ("dE", "cE", "eE")))
+    patch.setattr(precise, "DIRECT_PATH", tuple(const[k] for k in ("dU", "cU", "eU")))
+    bounces = {field: const[field] for field in vars(precise.BOUNCES)}
+    patch.setattr(precise, "BOUNCES", precise.Bounces(**bounces))
+    for name, value in list(vars(precise).items()):
+        if hasattr(value, "__wrapped__") and hasattr(value, "lower"):
+            patch.setattr(precise, name, value.__wrapped__)  # without what was traced with other constants
+
+
+def test_values_with_linear_tables_are_those_of_the_oracle(oracle, monkeypatch):
+    data = json.loads((oracle / "interface_tables.json").read_text())
+    constants(data["const"], monkeypatch)
+    as_array = lambda layer: jax.tree.map(lambda v: jnp.asarray(v, float), layer)  # noqa: E731
+    found = []
+    for case in json.loads((oracle / "precise_cases.json").read_text())["cases"]:
+        c, b = case["coat"], case["base"]
+        interface = Linear(data[case["interface"]], c["ior"], c["a"], data["const"])
+        base = Lambert(albedo=b["rho"]) if b["kind"] == "lambert" else Conductor(alpha=b["a"], eta=b["n"], k=b["k"])
+        coat = as_array(Coat(alpha=c["a"], eta=c["ior"], tau=c["tau"]))
+        base = as_array(base).below(coat.eta)
+        i, o = interface.cross(case["wi"]), interface.cross(case["wo"])
+        value = float(precise.below(i, o, coat, base, jnp.asarray(interface.returned(c["tau"]))))
+        found.append(abs(value / float(case["f_sub"]) - 1.0))
+    assert len(found) == 240
+    assert max(found) < 1e-13
+
+
+@functools.cache
+def errors(oracle, interface, kind):
+    """Relative error of the light from below the coat, by row of the walk, and the width of the base."""
+    chosen = json.loads((oracle / "walk_truth.json").read_text())["rows"]
+    chosen = [r for r in chosen if r["interface"] == interface and r["base"]["kind"] == kind]
+    column = lambda of: jnp.array([of(r) for r in chosen])  # noqa: E731
+    coat = Coat(
+        alpha=column(lambda r: r["coat"]["a"]), eta=column(lambda r: r["coat"]["ior"]), tau=column(lambda r: r["coat"]["tau"])
+    )
+    if kind == "lambert":
+        base = Lambert(albedo=column(lambda r: r["base"]["rho"]))
+        width = np.ones(len(chosen))
+    else:
+        base = Conductor(
+            **{key: column(lambda r, k=k: r["base"][k]) for key, k in {"alpha": "a", "eta": "n", "k": "k"}.items()}
+        )
+        width = np.asarray(base.alpha)
+    stack = Stack((coat,), base, Precise(interface))
+
+    def row(stack, wi, wo):
+        p = stack.prepare()
+        i = precise.pass_interface(p.interface, p.coat.eta, p.coat.alpha, wi)
+        cross = lambda w: precise.pass_interface(p.interface, p.coat.eta, p.coat.alpha, w)  # noqa: E731
+        return jax.vmap(lambda w: precise.below(i, cross(w), p.coat, p.base, p.returned))(wo)
+
+    wo, truth = column(lambda r: r["wos"]), np.asarray(column(lambda r: r["f_sub"]))
+    f = np.asarray(jax.jit(jax.vmap(row))(stack, column(lambda r: r["wi"]), wo))
+    mu = np.asarray(wo[..., 2])
+    return np.sum(np.abs(f - truth) * mu, 1) / np.sum(truth * mu, 1), width
+
+
+@pytest.mark.parametrize("interface", ["single", "multi"])
+@pytest.mark.parametrize(
+    ("kind", "narrow", "p50", "p90"),
+    [("lambert", False, 0.01, 0.02), ("conductor", False, 0.04, 0.12), ("conductor", True, 0.05, 0.17)],
+)
+def test_it_is_near_to_the_walk(oracle, interface, kind, narrow, p50, p90):
+    error, width = errors(oracle, interface, kind)
+    error = error[width < 0.2] if narrow else error
+    assert np.median(error) <= p50
+    assert np.quantile(error, 0.9) <= p90
+
+
+@pytest.mark.parametrize("interface", ["single", "multi"])
+def test_the_baked_curves_are_the_tables(interface):
+    """At the nodes of the tables, where the interpolation is exact, what is left is the error of the polynomials."""
+    t = tables.load(interface)
+    worst: dict[str, list[float]] = {"T": [], "path": [], "spread": []}
+    for e in range(0, len(t.eta), 2):
+        for a in range(0, len(t.alpha), 3):
+            eta, alpha = (jnp.asarray(float(x)) for x in (t.eta[e], t.alpha[a]))
+            baked, _ = curves.bake(eta, alpha, interface)
+            mu = t.mu.astype(float)
+            w = jnp.stack([jnp.sqrt(1.0 - mu**2), 0.0 * mu, mu], -1)
+            found = jax.vmap(lambda w, baked=baked, eta=eta, alpha=alpha: precise.pass_interface(baked, eta, alpha, w))(w)
+            closed = jax.vmap(
+                lambda w, eta=eta, alpha=alpha: rough_transmittance(
+                    facet_cosine(w, facet_tilt(alpha)), eta, second_facet(alpha)
+                )
+            )(w)
+            wanted = {
+                "T": np.clip(closed + t.dT[e, a], 0, 1),
+                "path": 1.0 + t.kt[e, a],
+                "spread": precise.WIDTH * alpha * t.w[e, a],
+            }
+            for name, value in {"T": found.T, "path": found.path, "spread": found.a}.items():
+                scale = 1.0 if name == "T" else wanted[name]
+                worst[name].append(float(np.max(np.abs(value - wanted[name]) / scale)))
+    assert max(worst["T"]) < 2e-3
+    assert np.median(worst["path"]) < 2e-3
+    assert np.median(worst["spread"]) < 0.01
+
+
+def test_interpolation_is_smooth_and_exact_for_parabolas():
+    nodes = np.array([1.0, 1.3, 1.4, 2.0, 2.5])
+    x = jnp.linspace(1.0, 2.5, 301)
+    weights = jax.vmap(lambda x: curves._cubic(x, nodes))(x)
+    np.testing.assert_allclose(weights @ (nodes**2 - nodes), x**2 - x, rtol=1e-12)
+    slope = jax.vmap(jax.grad(lambda x: curves._cubic(x, nodes) @ jnp.sin(3.0 * nodes)))
+    below, above = slope(jnp.asarray(nodes[1:-1] - 1e-9)), slope(jnp.asarray(nodes[1:-1] + 1e-9))
+    np.testing.assert_allclose(below, above, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", PRECISE)
+def test_float32_is_enough(name):
+    wi, wo = hemisphere(512, 5), hemisphere(512, 6)
+    wide = brdf_rows(STACKS[name].astype(np.float64), wi, wo)
+    narrow = brdf_rows(STACKS[name].astype(np.float32), wi.astype(np.float32), wo.astype(np.float32))
+    assert narrow.dtype == np.float32
+    np.testing.assert_allclose(narrow, wide, rtol=2e-3, atol=1e-5)
+    assert np.median(np.abs(narrow / wide - 1.0)) < 3e-6
+
+
+@pytest.mark.parametrize("interface", ["single", "multi"])
+@pytest.mark.parametrize(
+    "base", [Conductor(alpha=0.3, **COPPER), Lambert(albedo=0.7), OrenNayar(albedo=0.7)], ids=lambda b: b.name
+)
+def test_a_coat_that_is_not_there_changes_nothing(interface, base):
+    """Index 1 and no absorption: the base alone, but for the polynomials."""
+    wi, wo = hemisphere(256, 3), hemisphere(256, 4)
+    bare = brdf_rows(Stack((), base).astype(np.float64), wi, wo)
+    for tau in (None, 0.0):
+        coated = Stack((Coat(alpha=0.2, eta=1.0, tau=tau),), base, Precise(interface)).astype(np.float64)
+        np.testing.assert_allclose(brdf_rows(coated, wi, wo), bare, rtol=2e-5)
+
+
+def test_it_refuses_what_it_is_not_for():
+    coat, metal = Coat(), Conductor(alpha=0.2, **COPPER)
+    assert refuses((coat,), metal) is None
+    assert refuses((coat,), OrenNayar()) is None
+    for layers, base in [
+        ((), metal),
+        ((coat, coat), metal),
+        ((Coat(distribution="beckmann"),), metal),
+        ((Coat(alpha=None, alpha_x=0.1, alpha_y=0.2),), metal),
+        ((coat,), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.2, **COPPER)),
+        ((coat,), Dielectric(alpha=0.2, eta=1.5)),
+    ]:
+        assert refuses(layers, base)
+        if layers:
+            with pytest.raises(ValueError, match="precise form is not for this material"):
+                Stack(layers, base, Precise()).astype(np.float32).prepare()
+
+
+METAL = {"type": "conductor", "alpha": 0.2, "eta": [0.2, 0.9, 1.1], "k": [3.9, 2.5, 2.1]}
+
+
+def test_it_is_the_default_where_the_structure_allows_it():
+    assert stack_of({"layers": [{"type": "coat"}], "base": METAL}, "here").form == Precise("single")
+    assert not isinstance(stack_of({"base": METAL}, "here").form, Precise)
+    assert not isinstance(
+        stack_of({"layers": [{"type": "coat", "distribution": "beckmann"}], "base": METAL}, "here").form, Precise
+    )
+
+
+def test_its_interface_is_kept_in_a_preset_and_checked():
+    stack = stack_of({"model": "precise", "interface": "multi", "layers": [{"type": "coat"}], "base": METAL}, "here")
+    document = preset_of(stack, "copper")
+    assert (document["model"], document["interface"]) == ("precise", "multi")
+    with pytest.raises(InputError, match="single or multi"):
+        stack_of({"interface": "double", "layers": [{"type": "coat"}], "base": METAL}, "here")
+    with pytest.raises(InputError, match='of model = "precise"'):
+        stack_of({"model": "corrected", "interface": "multi", "layers": [{"type": "coat"}], "base": METAL}, "here")
+    with pytest.raises(InputError, match="not for this material: there is no coat"):
+        stack_of({"model": "precise", "base": METAL}, "here")

@@ -1,0 +1,186 @@
+"""Fit the constants of the precise form to the random walk.
+
+    python tools/fit_precise.py make ROWS.npz [--count 600] [--paths 30000] [--seed 1]
+    python tools/fit_precise.py fit ROWS.npz [ROWS.npz ...]
+    python tools/fit_precise.py check ROWS.npz [ROWS.npz ...]
+
+`make` walks through random materials (GGX coat .03 to .6 wide, index 1.25 to 2.2, optical depth 0 to 2, over a conductor .05 to .8 wide or
+a Lambert base) at random angles; `fit` prints constants for `layerfit/forms/precise.py`; `check` prints how near the form is: per row the
+sum of |f - truth| cos over that of truth cos, light from below the coat only, as median and 90th percentile over the rows.
+"""
+
+import argparse
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.optimize import least_squares
+
+from layerfit.forms import curves, precise
+from layerfit.layers import Coat
+from layerfit.stack import Stack
+from layerfit.surfaces import Conductor, Lambert
+from layerfit.walk import walk_rows
+
+VIEWS = 6
+NARROW = 0.2
+
+
+def make(path: Path, count: int, paths: int, seed: int) -> None:
+    """Half of the rows for each interface; three of four over a conductor."""
+    rng = np.random.default_rng(seed)
+    log = lambda low, high, n: np.exp(rng.uniform(np.log(low), np.log(high), n))  # noqa: E731
+    saved: dict[str, np.ndarray] = {}
+    for interface in ("single", "multi"):
+        for kind, n in (("conductor", count * 3 // 8), ("lambert", count // 8)):
+            coat = {
+                "alpha": log(0.03, 0.6, n),
+                "eta": rng.uniform(1.25, 2.2, n),
+                "tau": rng.uniform(0, 2, n) * (rng.random(n) > 0.25),
+            }
+            base = {"albedo": rng.uniform(0.2, 0.95, n)}
+            if kind == "conductor":
+                base = {"alpha": log(0.05, 0.8, n), "eta": rng.uniform(0.2, 3.0, n), "k": rng.uniform(1.5, 6.0, n)}
+            wi = _directions(rng, rng.uniform(0.0, np.radians(80.0), n))[:, None].repeat(VIEWS, 1)
+            wo = _directions(rng, np.arccos(rng.uniform(0.15, 1.0, (n, VIEWS))))
+            # Half of them about the mirror direction, where the light is.
+            near = wi[:, : VIEWS // 2] * [-1.0, -1.0, 1.0] + 0.25 * rng.normal(size=(n, VIEWS // 2, 3))
+            near[..., 2] = np.maximum(np.abs(near[..., 2]), 0.15)
+            wo[:, : VIEWS // 2] = near / np.linalg.norm(near, axis=-1, keepdims=True)
+            flat = lambda table: {key: value.repeat(VIEWS) for key, value in table.items()}  # noqa: E731
+            surface = Lambert if kind == "lambert" else Conductor
+            stack = Stack((Coat(**flat(coat), masking="smith_separable"),), surface(**flat(base)))
+            found = walk_rows(stack, wi.reshape(-1, 3), wo.reshape(-1, 3), paths=paths, seed=seed, interface=interface)
+            name = f"{interface}_{kind}"
+            columns = coat | {f"base_{key}": value for key, value in base.items()} | {"wi": wi[:, 0], "wo": wo}
+            saved |= {f"{name}_{key}": value for key, value in columns.items()}
+            saved |= {f"{name}_f": found.mean.mean(-1).reshape(n, VIEWS), f"{name}_se": found.se.mean(-1).reshape(n, VIEWS)}
+    np.savez_compressed(path, **saved)
+
+
+def _directions(rng: np.random.Generator, theta: np.ndarray) -> np.ndarray:
+    phi = rng.uniform(0.0, 2.0 * np.pi, theta.shape)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+
+
+def rows(paths: list[Path], interface: str, kind: str) -> dict[str, np.ndarray]:
+    """All rows of one kind."""
+    files = [np.load(path) for path in paths]
+    prefix = f"{interface}_{kind}_"
+    keys = [key.removeprefix(prefix) for key in files[0] if key.startswith(prefix)]
+    return {key: np.concatenate([file[prefix + key] for file in files]).astype(np.float32) for key in keys}
+
+
+def form(row: dict[str, Any], interface: str, kind: str) -> Any:
+    """Light from below the coat, (rows, views)."""
+    base = {key.removeprefix("base_"): value for key, value in row.items() if key.startswith("base_")}
+    coat = Coat(alpha=row["alpha"], eta=row["eta"], tau=row["tau"])
+
+    def one(coat: Coat, base: Any, wi: Any, wo: Any) -> Any:
+        p = precise.prepare((coat,), base, precise.Precise(interface))
+
+        def pair(wo: Any) -> Any:
+            i, o = (precise.pass_interface(p.interface, p.coat.eta, p.coat.alpha, w) for w in (wi, wo))
+            return precise.below(i, o, p.coat, p.base, p.returned)
+
+        return jax.vmap(pair)(wo)
+
+    surface = Lambert if kind == "lambert" else Conductor
+    return jax.vmap(one)(coat, surface(**base), row["wi"], row["wo"])
+
+
+def error(f: np.ndarray, row: dict[str, np.ndarray]) -> np.ndarray:
+    mu = row["wo"][..., 2]
+    return np.sum(np.abs(f - row["f"]) * mu, -1) / np.sum(row["f"] * mu, -1)
+
+
+def check(paths: list[Path]) -> None:
+    for interface in ("single", "multi"):
+        for kind in ("lambert", "conductor"):
+            row = rows(paths, interface, kind)
+            errors = error(np.asarray(jax.jit(form, static_argnums=(1, 2))(row, interface, kind)), row)
+            noise = np.median(np.sum(row["se"] * row["wo"][..., 2], -1) / np.sum(row["f"] * row["wo"][..., 2], -1))
+            parts = {"all": errors}
+            if kind == "conductor":
+                parts["narrow bases"] = errors[row["base_alpha"] < NARROW]
+            for name, values in parts.items():
+                p50, p90 = np.quantile(values, [0.5, 0.9])
+                print(
+                    f"{interface:7} {kind:10} {name:13} {len(values):5} rows  p50 {p50:.3f}  p90 {p90:.3f}  (noise {noise:.3f})"
+                )
+
+
+NAMES = ("P", "WIDTH", "CONDENSE", "RISE", "RATIO", "TAIL")
+
+
+def fit(paths: list[Path]) -> None:
+    """Levenberg-Marquardt on a smooth form of the error, constants scaled by their present values."""
+    start = {name: getattr(precise, name) for name in NAMES} | {"STEER": curves.STEER}
+    start |= {f"DIRECT{k}": v for k, v in enumerate(precise.DIRECT)} | {
+        f"DIRECT_PATH{k}": v for k, v in enumerate(precise.DIRECT_PATH)
+    }
+    start |= {f"BOUNCES.{key}": value for key, value in vars(precise.BOUNCES).items()}
+    names, origin = list(start), np.array(list(start.values()))
+    _loosen()
+    sets = [(i, rows(paths, i, "conductor")) for i in ("single", "multi")]
+
+    def residual(x: Any) -> Any:
+        _set(dict(zip(names, x * jnp.asarray(origin, jnp.float32), strict=True)))
+        parts = []
+        for interface, row in sets:
+            mu = row["wo"][..., 2]
+            r = (form(row, interface, "conductor") - row["f"]) * mu / np.sum(row["f"] * mu, -1, keepdims=True)
+            parts.append(r.ravel())
+        return jnp.concatenate(parts) * VIEWS
+
+    value, jacobian = jax.jit(residual), jax.jit(jax.jacfwd(residual))
+    found = least_squares(
+        lambda x: np.asarray(value(jnp.asarray(x, jnp.float32)), float),
+        np.ones(len(names)),
+        jac=lambda x: np.asarray(jacobian(jnp.asarray(x, jnp.float32)), float),
+        loss="soft_l1",
+        f_scale=0.05,
+        bounds=(0.3, 3.0),
+        max_nfev=60,
+    )
+    for name, old, new in zip(names, origin, found.x * origin, strict=True):
+        print(f"{name:16} {old:10.5g} -> {new:.5g}")
+    print(f"cost {found.cost:.4g}")
+
+
+def _loosen() -> None:
+    """Let constants be traced: functions without their caches, powers with any exponent."""
+    for name, value in vars(precise).items():
+        if hasattr(value, "__wrapped__") and hasattr(value, "lower"):
+            setattr(precise, name, value.__wrapped__)
+    precise.safe_power = lambda x, exponent: jnp.power(jnp.maximum(x, 1e-30), exponent)
+
+
+def _set(values: dict[str, Any]) -> None:
+    for name in NAMES:
+        setattr(precise, name, values[name])
+    curves.STEER = values["STEER"]
+    for name in ("DIRECT", "DIRECT_PATH"):
+        setattr(precise, name, tuple(values[f"{name}{k}"] for k in range(3)))
+    precise.BOUNCES = SimpleNamespace(**{key[8:]: value for key, value in values.items() if key.startswith("BOUNCES.")})
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("command", choices=("make", "fit", "check"))
+    parser.add_argument("rows", nargs="+", type=Path)
+    parser.add_argument("--count", type=int, default=600)
+    parser.add_argument("--paths", type=int, default=30000)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    if arguments.command == "make":
+        make(arguments.rows[0], arguments.count, arguments.paths, arguments.seed)
+    else:
+        (fit if arguments.command == "fit" else check)(arguments.rows)
+
+
+if __name__ == "__main__":
+    main()
