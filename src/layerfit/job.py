@@ -22,6 +22,8 @@ from .fit.residuals import scaled
 from .fit.result import FitResult, to_json
 from .fit.weights import FLOOR_SHARE, MODEL_SHARE
 from .fit.words import structure
+from .forms.accuracy import against_walk
+from .forms.precise import Precise, refuses
 from .preset import model_name, preset_of
 from .render import predict
 from .report import html, pictures
@@ -109,6 +111,7 @@ def fit_scene(
     document = finite(to_json(result, errors, parity_document, seconds, "preset.json"))
     document["flags"] += [] if parity.passed else ["shader_differs"]
     document["model"] = _model(result.stack)
+    document["model_error"] = against_walk(result.stack.layers, result.stack.base, result.stack.form) or {}
     document["pixels"]["usable"] = sum(len(view.index) for view in result.views)
     document["weighting"] = {
         "kind": request.weights,
@@ -133,7 +136,19 @@ def _model(stack: Stack) -> dict[str, Any]:
         "name": model_name(stack),
         "options": preset_of(stack, "").get("options", {}),
         "layers": structure(stack),
-    }
+        "why": _why(stack),
+    } | ({"interface": stack.form.interface} if isinstance(stack.form, Precise) else {})
+
+
+def _why(stack: Stack) -> str:
+    """What speaks for the form of a material, and what against a nearer one."""
+    if not stack.layers:
+        return "a surface without a coat is evaluated on its own"
+    reason = refuses(stack.layers, stack.base)
+    if reason:
+        return f"the precise form is not for this material: {reason}"
+    nearest = "the form nearest to the random walk for one coat"
+    return nearest if isinstance(stack.form, Precise) else f"asked for; precise is {nearest}"
 
 
 def _quadrature(result: FitResult) -> dict[str, Any] | None:

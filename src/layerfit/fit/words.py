@@ -83,6 +83,13 @@ def measured(value: Any, sigma: Any) -> tuple[str, str]:
     return f"{value:.{decimals}f}", f"{sigma:.{decimals}f}" if decimals == wanted else f"{sigma:.2g}"
 
 
+def model_error(error: Mapping[str, Any]) -> str:
+    """How far the form itself is from the truth, which no fit can better."""
+    if not error:
+        return "not measured for this material"
+    return f"{100.0 * error['p50']:.2g} % (median of materials), {100.0 * error['p90']:.2g} % (9 of 10), {error['of']}"
+
+
 def poor(misfit: float) -> str:
     """What a poor fit means, in a sentence."""
     return (

@@ -16,6 +16,8 @@ def lines(document: Mapping[str, Any]) -> list[str]:
     out += _rows(
         {
             "model": f"{d['model']['layers']}, {d['model']['name']} form{_options(d['model']['options'])}",
+            "why": d["model"]["why"],
+            "off by": words.model_error(d["model_error"]),
             "converged": words.converged(d["converged"], d["steps"]),
             "flags": ", ".join(d["flags"]) or "none",
             "error": image_error(d["error"]),
