@@ -89,7 +89,12 @@ def test_the_result_is_as_promised(fitted):
     assert document["parity"]["p999_rel"] < 1e-5
     assert document["starts"] == 3
     assert document["preset"] == "preset.json"
-    assert document["model"] == {"name": "corrected", "options": {}, "layers": "Coat over Conductor"}
+    assert document["model"] == {
+        "name": "corrected",
+        "options": {},
+        "layers": "Coat over Conductor",
+        "why": "asked for; precise is the form nearest to the random walk for one coat",
+    }
     assert document["quadrature"] is None
     assert document["weighting"]["noise"] == [False]
 

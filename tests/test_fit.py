@@ -226,6 +226,15 @@ def test_the_weights_follow_the_law_of_the_noise_not_its_accidents():
     assert np.ptp(inverse_sigma(model, model, noise, "uniform"), axis=0).max() == 0.0
 
 
+def test_a_firefly_counts_as_eight_scatters_and_nothing_else_is_touched():
+    residual = np.random.default_rng(0).normal(size=(1000, 3))
+    residual[0] = 100.0
+    factor = robust(residual, "square")
+    np.testing.assert_allclose(factor[0] ** 2 * 100.0, 8.0, rtol=0.1)
+    assert np.all(factor[1:] == 1.0)
+    assert np.all(robust(0.1 * residual[1:] ** 3, "square")[np.abs(residual[1:]) < 2.5] == 1.0)
+
+
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
 def test_robust_factors_leave_the_bulk_and_lower_the_tail(loss):
     residual = np.random.default_rng(0).normal(size=(1000, 3))

@@ -13,7 +13,12 @@ from layerfit.report.text import image_error, lines, relative, worst
 
 DOCUMENT = {
     "model": {"name": "faithful", "options": {"refract_at": "n"}, "layers": "Coat over Lambert", "why": "asked for"},
-    "model_error": {"of": "light from below the coat, against the random walk", "interface": "single", "p50": 0.02, "p90": 0.05},
+    "model_error": {
+        "of": "light from below the coat, against the random walk",
+        "interface": "single",
+        "p50": 0.02,
+        "p90": 0.05,
+    },
     "converged": False,
     "flags": ["not_converged", "poor_fit", "at_bound:coat.alpha"],
     "misfit": 0.234,

@@ -143,8 +143,7 @@ class _Fit:
         values = []
         for model, samples in zip(models, self.samples, strict=True):
             weight = inverse_sigma(model, samples.target, samples.noise, self.weights)
-            if self.loss != "square":
-                weight = weight * robust((model - samples.target) * weight, self.loss)
+            weight = weight * robust((model - samples.target) * weight, self.loss)
             values.append(weight)
         return values
 

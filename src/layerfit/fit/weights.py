@@ -21,6 +21,10 @@ NOISE_EXPONENT = 0.7
 """Monte Carlo noise of a radiance f grows like f^.7 in renders of coated spheres."""
 
 
+FIREFLY = 8.0
+"""Scatters (1.48 median absolute residuals) from which on a residual is called a firefly."""
+
+
 def inverse_sigma(model: np.ndarray, target: np.ndarray, noise: np.ndarray | None, kind: str) -> np.ndarray:
     """Weight of each residual, (pixels, 3), from the model's values there. `kind` is "law" or "uniform"."""
     bright = np.maximum(np.quantile(target, 0.98, axis=0), 1e-12 + 1e-3 * np.quantile(target, 0.98))
@@ -43,14 +47,19 @@ def noise_law(model: np.ndarray, noise: np.ndarray) -> np.ndarray:
 
 
 def robust(residual: np.ndarray, loss: str) -> np.ndarray:
-    """Factor on the weights of one round of iteratively reweighted least squares; residuals in units of their sigma."""
-    scale = 1.4826 * np.median(np.abs(residual)) + 1e-30
-    size = np.abs(residual) / scale
+    """Factor on the weights of one round of iteratively reweighted least squares; residuals (pixels, channels) in units of sigma.
+
+    "square" is not quite: a path tracer's fireflies are a handful of pixels, and squared they outweigh all others. Beyond `FIREFLY`
+    scatters of its channel, and two sigma, a residual counts as that many. A lower cap would pull a fit down, because such noise is skewed.
+    """
+    scatter = 1.4826 * np.median(np.abs(residual), axis=0)
+    if loss == "square":
+        cap = np.maximum(FIREFLY * scatter, 2.0)
+        return np.sqrt(cap / np.maximum(np.abs(residual), cap)).astype(np.float32)
+    size = np.abs(residual) / (scatter + 1e-30)
     if loss == "huber":
         return np.sqrt(1.345 / np.maximum(size, 1.345)).astype(np.float32)
-    if loss == "cauchy":
-        return (1.0 / np.sqrt(1.0 + (size / 2.385) ** 2)).astype(np.float32)
-    return np.ones_like(residual, np.float32)
+    return (1.0 / np.sqrt(1.0 + (size / 2.385) ** 2)).astype(np.float32)
 
 
 def misfit(models: Sequence[np.ndarray], samples: Sequence[Samples], weights: Sequence[np.ndarray]) -> float:
