@@ -56,7 +56,7 @@ def robust(residual: np.ndarray, loss: str) -> np.ndarray:
     if loss == "square":
         cap = np.maximum(FIREFLY * scatter, 2.0)
         return np.sqrt(cap / np.maximum(np.abs(residual), cap)).astype(np.float32)
-    size = np.abs(residual) / (scatter + 1e-30)
+    size = np.abs(residual) / (scatter + 1e-12)
     if loss == "huber":
         return np.sqrt(1.345 / np.maximum(size, 1.345)).astype(np.float32)
     return (1.0 / np.sqrt(1.0 + (size / 2.385) ** 2)).astype(np.float32)
