@@ -28,7 +28,7 @@ _RAMP = (
 )
 """Dark to bright through violet and orange: even in lightness, and readable without colour vision."""
 
-_BACKGROUND, _INK, _LINE = (24, 24, 27), (228, 228, 231), (63, 63, 70)
+BACKGROUND, INK, LINE = (24, 24, 27), (228, 228, 231), (63, 63, 70)
 _NOT_COMPARED = 0.3
 """Grey of pixels that a difference leaves out: no colour of the ramp."""
 _SIDE = 256
@@ -65,18 +65,18 @@ def strip(rows: Sequence[Sequence[Panel]]) -> bytes:
     height, width = round(height * factor), round(width * factor)
     columns = max(len(row) for row in rows)
     row_height = height + _GAP + 2 * _LINE_HEIGHT
-    canvas = Image.new("RGB", (columns * (width + _GAP) + _GAP, len(rows) * row_height + _GAP), _BACKGROUND)
+    canvas = Image.new("RGB", (columns * (width + _GAP) + _GAP, len(rows) * row_height + _GAP), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     font = ImageFont.load_default(13)
     for r, row in enumerate(rows):
         for c, panel in enumerate(row):
             x, y = _GAP + c * (width + _GAP), _GAP + r * row_height
-            draw.text((x, y + 2), _fitting(draw, panel.caption, width, font), fill=_INK, font=font)
+            draw.text((x, y + 2), _fitting(draw, panel.caption, width, font), fill=INK, font=font)
             picture = _fitted(panel.image, width, height)
             canvas.paste(picture, (x, y + _LINE_HEIGHT))
             if panel.scale:
                 _draw_scale(canvas, draw, (x, y + _LINE_HEIGHT + height + 5), width, panel.scale, font)
-    return _png(canvas)
+    return png(canvas)
 
 
 def _fitted(image: np.ndarray, width: int, height: int) -> Image.Image:
@@ -101,20 +101,20 @@ def _draw_scale(canvas: Image.Image, draw: ImageDraw.ImageDraw, at: tuple[int, i
     x, y = at
     bar = max(24, width // 3 - 20)
     colours = np.repeat(false_colour(np.linspace(0.0, 1.0, bar))[None], 10, 0)
-    draw.text((x, y - 3), "0", fill=_INK, font=font)
+    draw.text((x, y - 3), "0", fill=INK, font=font)
     canvas.paste(Image.fromarray((colours * 255.0 + 0.5).astype(np.uint8)), (x + 12, y))
-    draw.text((x + bar + 18, y - 3), end, fill=_INK, font=font)
+    draw.text((x + bar + 18, y - 3), end, fill=INK, font=font)
     text, grey = "left out", round(255 * _NOT_COMPARED)
     left = x + width - draw.textlength(text, font=font)
     if left - 16 > x + bar + 24 + draw.textlength(end, font=font):
         draw.rectangle((left - 15, y, left - 6, y + 9), fill=(grey, grey, grey))
-        draw.text((left, y - 3), text, fill=_INK, font=font)
+        draw.text((left, y - 3), text, fill=INK, font=font)
 
 
 def convergence(rows: Sequence[tuple[float, str, int, float]]) -> bytes:
     """Error of a fit against its run time, a dot a step of (seconds, stage, start, error), as a PNG: one line a start."""
     width, height, left, right, low, top = 760, 300, 64, 16, 44, 34
-    canvas = Image.new("RGB", (width, height), _BACKGROUND)
+    canvas = Image.new("RGB", (width, height), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     font = ImageFont.load_default(13)
     error = np.log10(np.maximum([row[3] for row in rows], 1e-30))
@@ -123,14 +123,14 @@ def convergence(rows: Sequence[tuple[float, str, int, float]]) -> bytes:
     to_x = lambda t: left + t / end * (width - left - right)  # noqa: E731
     to_y = lambda e: top + (ceiling - e) / (ceiling - floor) * (height - top - low)  # noqa: E731
     for decade in np.arange(floor, ceiling + 1, max(1.0, np.ceil((ceiling - floor) / 6))):
-        draw.line([(left, to_y(decade)), (width - right, to_y(decade))], fill=_LINE)
+        draw.line([(left, to_y(decade)), (width - right, to_y(decade))], fill=LINE)
         draw.text(
-            (10, to_y(decade) - 8), f"{10.0**decade:.0e}" if abs(decade) > 3 else f"{10.0**decade:g}", fill=_INK, font=font
+            (10, to_y(decade) - 8), f"{10.0**decade:.0e}" if abs(decade) > 3 else f"{10.0**decade:g}", fill=INK, font=font
         )
-    for second in _ticks(end):
-        draw.line([(to_x(second), height - low), (to_x(second), height - low + 5)], fill=_INK)
-        draw.text((to_x(second) - 6, height - low + 8), f"{second:g}", fill=_INK, font=font)
-    draw.text((width / 2 - 70, height - 18), "seconds since the fit began", fill=_INK, font=font)
+    for second in ticks(end):
+        draw.line([(to_x(second), height - low), (to_x(second), height - low + 5)], fill=INK)
+        draw.text((to_x(second) - 6, height - low + 8), f"{second:g}", fill=INK, font=font)
+    draw.text((width / 2 - 70, height - 18), "seconds since the fit began", fill=INK, font=font)
     stages = list(dict.fromkeys(row[1].split()[0] for row in rows))
     colours = {s: _stage_colour(i / max(len(stages) - 1, 1)) for i, s in enumerate(stages)}
     before: tuple[str, int] | None = None
@@ -140,13 +140,13 @@ def convergence(rows: Sequence[tuple[float, str, int, float]]) -> bytes:
             draw.line([(to_x(rows[k - 1][0]), to_y(error[k - 1])), point], fill=colour)
         draw.ellipse([point[0] - 2, point[1] - 2, point[0] + 2, point[1] + 2], fill=colour)
         before = stage, start
-    draw.text((10, 8), "error of the pixels in use, relative:", fill=_INK, font=font)
+    draw.text((10, 8), "error of the pixels in use, relative:", fill=INK, font=font)
     x = 10 + draw.textlength("error of the pixels in use, relative:", font=font) + 16
     for stage, colour in colours.items():
         draw.ellipse([x, 13, x + 7, 20], fill=colour)
-        draw.text((x + 12, 8), stage, fill=_INK, font=font)
+        draw.text((x + 12, 8), stage, fill=INK, font=font)
         x += 28 + draw.textlength(stage, font=font)
-    return _png(canvas)
+    return png(canvas)
 
 
 def _stage_colour(place: float) -> tuple[int, int, int]:
@@ -154,7 +154,7 @@ def _stage_colour(place: float) -> tuple[int, int, int]:
     return r, g, b
 
 
-def _ticks(end: float) -> np.ndarray:
+def ticks(end: float) -> np.ndarray:
     """About six round numbers from 0 to `end`."""
     raw = end / 6.0
     power = 10.0 ** np.floor(np.log10(raw))
@@ -164,10 +164,11 @@ def _ticks(end: float) -> np.ndarray:
 
 def plain(image: np.ndarray, white: float) -> bytes:
     """A linear image as an sRGB PNG."""
-    return _png(Image.fromarray((display(image, white) * 255.0 + 0.5).astype(np.uint8)))
+    return png(Image.fromarray((display(image, white) * 255.0 + 0.5).astype(np.uint8)))
 
 
-def _png(image: Image.Image) -> bytes:
+def png(image: Image.Image) -> bytes:
+    """The file of a picture."""
     out = io.BytesIO()
     image.save(out, "PNG", optimize=True)
     return out.getvalue()
