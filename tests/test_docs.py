@@ -26,6 +26,7 @@ from layerfit.capture.scene import (
 from layerfit.cli import app
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
+from layerfit.forms.precise import Precise
 from layerfit.preset import read_preset
 
 REPOSITORY = Path(__file__).parents[1]
@@ -192,7 +193,7 @@ def test_every_key_of_a_scene_is_described():
     assert not missing
 
 
-@pytest.mark.parametrize("form", [Corrected, Faithful])
+@pytest.mark.parametrize("form", [Corrected, Faithful, Precise])
 def test_every_option_of_a_form_is_described(form):
     text = manual.BLOCK.sub("", (REPOSITORY / "docs" / "model.md").read_text())
     assert not {f.name for f in dataclasses.fields(form) if f"`{f.name}`" not in text}

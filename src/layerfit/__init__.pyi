@@ -10,6 +10,7 @@ from .fit.metrics import image_error as image_error
 from .fit.result import FitResult as FitResult, parameters as parameters
 from .forms.corrected import Corrected as Corrected
 from .forms.faithful import Faithful as Faithful
+from .forms.precise import Precise as Precise
 from .job import fit_scene as fit_scene
 from .layers import Coat as Coat
 from .preset import read_preset as read_preset, write_preset as write_preset

@@ -13,12 +13,12 @@ from . import corrected, precise
 NARROW = 0.2
 
 MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
-    ("precise", "single", "diffuse"): (0.003, 0.007),
-    ("precise", "single", "conductor"): (0.018, 0.054),
-    ("precise", "single", "narrow"): (0.017, 0.052),
-    ("precise", "multi", "diffuse"): (0.005, 0.017),
-    ("precise", "multi", "conductor"): (0.016, 0.043),
-    ("precise", "multi", "narrow"): (0.015, 0.045),
+    ("precise", "single", "diffuse"): (0.002, 0.006),
+    ("precise", "single", "conductor"): (0.022, 0.080),
+    ("precise", "single", "narrow"): (0.024, 0.102),
+    ("precise", "multi", "diffuse"): (0.003, 0.009),
+    ("precise", "multi", "conductor"): (0.017, 0.044),
+    ("precise", "multi", "narrow"): (0.020, 0.053),
 }
 """(form, interface, base): median and 90th percentile over materials."""
 
