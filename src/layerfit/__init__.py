@@ -1,6 +1,6 @@
 """Fit layered materials to reference renders, and print them as shaders.
 
-- Materials: Stack of Coat over Conductor, Dielectric, Lambert or OrenNayar, in the form Corrected or Faithful; read_preset, write_preset.
+- Materials: Stack of Coat over Conductor, Dielectric, Lambert or OrenNayar, in the form Precise, Corrected or Faithful; read_preset, write_preset.
 - References: read_scene gives a Scene, load its View of each reference, from which Samples are drawn; inspect says what an EXR holds.
 - Fitting: fit gives a FitResult, parameters its values with sigmas; fit_scene does what `layerfit fit` does; image_error compares pictures.
 - Rendering: predict gives pixels, radiance the same traced, brdf the plain function.
