@@ -12,6 +12,7 @@ import pytest
 from helpers import STACKS
 from layerfit._chunk import CHUNKS, chunk, dot, member, safe_divide, safe_power, safe_sqrt, struct
 from layerfit._types import Scalar, Vec3
+from layerfit.optics.hashing import hash_cell, unit
 from layerfit.shader.export import HEADERS, print_material
 from layerfit.shader.gl import shade_points
 from layerfit.shader.glsl import PrintError, literal
@@ -43,6 +44,18 @@ UNIT = rng.uniform(-1.0, 1.0, (500, 3))
 POSITIVE = 10.0 ** rng.uniform(-6.0, 3.0, (500, 3))
 SMALL = np.sign(UNIT) * 10.0 ** rng.uniform(-7.0, 0.0, (500, 3))
 ANGLE = rng.uniform(-1.5, 1.5, (500, 3))
+
+
+def _word(a):
+    """An unsigned word with all of its bits in use."""
+    return (a[0] * 1e6).astype(jnp.int32).astype(jnp.uint32) * jnp.uint32(2654435761)
+
+
+def _pieces(word):
+    """A word in two numbers that a float32 holds exactly."""
+    high = word >> jnp.uint32(16)
+    return jnp.stack([high, word - high * jnp.uint32(65536), jnp.uint32(0)]).astype(jnp.float32)
+
 
 PRIMITIVES = {
     "add": (lambda a, b: a + b, WIDE, UNIT),
@@ -80,6 +93,8 @@ PRIMITIVES = {
     "ne": (lambda a, b: jnp.where(a != b, 1.0, b), UNIT, UNIT),
     "and": (lambda a, b: jnp.where((a[0] > 0.0) & (b[0] > 0.0), a, b), UNIT, UNIT[::-1]),
     "or": (lambda a, b: jnp.where((a[0] > 0.0) | (b[0] > 0.0), a, b), UNIT, UNIT[::-1]),
+    "xor": (lambda a: _pieces(_word(a) ^ (_word(a) * jnp.uint32(40503))), WIDE),
+    "shift_right_logical": (lambda a: _pieces((_word(a) + jnp.uint32(7)) >> jnp.uint32(5)), WIDE),
     "not": (lambda a, b: jnp.where(~(a[0] > b[0]), a, b), UNIT, UNIT[::-1]),
     "select_n": (lambda a, b: jnp.where(a[0] > 0.0, b, a), UNIT, UNIT[::-1]),
     "broadcast_in_dim": (lambda a, b: jnp.full(3, a[0]) * jnp.ones(3, jnp.float32) + b, UNIT, UNIT[::-1]),
@@ -132,6 +147,39 @@ def test_primitive_on_the_gpu(gl, name):
     error = np.where(gpu == wanted, 0.0, np.abs(gpu - wanted) / scale)
     assert np.all(np.isfinite(gpu)), source
     assert error.max() <= LOOSE.get(name, 1e-6), (error.max(), source)
+
+
+def test_the_hash_is_the_same_to_the_bit(gl):
+    """On the GPU, in JAX, and in Python's own whole numbers."""
+
+    def word(k):
+        return lambda a: _pieces(hash_cell(jnp.floor(a[:2]), jnp.uint32(2**31 + 5))[k])
+
+    def by_hand(x, y, z):
+        mask = 2**32 - 1
+        x, y, z = ((v * 1664525 + 1013904223) & mask for v in (x, y, z))
+        for stir in range(2):
+            x = (x + y * z) & mask
+            y = (y + z * x) & mask
+            z = (z + x * y) & mask
+            if stir == 0:
+                x, y, z = (v ^ (v >> 16) for v in (x, y, z))
+        return x, y, z
+
+    cells = WIDE * 1e5
+    hashed = np.array([by_hand(*(int(v) & (2**32 - 1) for v in np.floor(np.float32(c[:2]))), 2**31 + 5) for c in cells])
+    for k in range(3):
+        gpu, jax_value, _ = run_both(word(k), cells)
+        np.testing.assert_array_equal(gpu, jax_value)
+        np.testing.assert_array_equal(gpu[:, 0] * 65536.0 + gpu[:, 1].astype(float), hashed[:, k])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_hashed_numbers_are_never_0_or_1(dtype):
+    for bits in (0, 2**32 - 1):
+        u = unit(jnp.uint32(bits), jnp.zeros((), dtype))
+        assert u.dtype == dtype
+        assert 0.0 < float(u) < 1.0
 
 
 def test_every_primitive_is_tried():

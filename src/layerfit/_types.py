@@ -6,12 +6,15 @@ Shading functions take scalars and 3-vectors; a batch is always added from outsi
 
 from typing import Any
 
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, UInt32
 
 Scalar = Float[Array, ""]
 Flag = Bool[Array, ""]
+Vec2 = Float[Array, "2"]
 Vec3 = Float[Array, "3"]
 Vec4 = Float[Array, "4"]
+UInt = UInt32[Array, ""]
+UVec3 = UInt32[Array, "3"]
 Colour = Float[Array, ""] | Float[Array, "3"]
 
 Number = Any

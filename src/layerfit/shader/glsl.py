@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 PREFIX = "lf_"
-ATOM, UNARY, PRODUCT, SUM, COMPARISON, LOGIC, CHOICE = range(7)
+ATOM, UNARY, PRODUCT, SUM, SHIFT, COMPARISON, XOR, LOGIC, CHOICE = range(9)
 """How tightly an expression binds, tightest first."""
 
 SCALAR_TYPES = {"f": "float", "b": "bool", "i": "int", "u": "uint"}
