@@ -15,8 +15,11 @@
 
 in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
 in vec3 v_normal;
-//@ if anisotropic
-in vec3 v_tangent;   // along which alpha_x is measured
+//@ if tangent
+in vec3 v_tangent;   // along which widths and patterns are measured
+//@ end
+//@ if uv
+in vec2 v_uv;        // texture coordinates
 //@ end
 out vec4 color;
 
@@ -31,14 +34,20 @@ uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per stera
 void main() {
     vec3 n = normalize(v_normal);
     vec3 v = normalize(u_eye - v_position);
+//@ if uv
+    vec2 uv = v_uv;
+//@ end
+//@ if distance
+    float distance = length(u_eye - v_position);  // in the unit of the space above
+//@ end
     vec3 radiance = vec3(0.0);
     for (int k = 0; k < LF_LIGHTS; ++k) {
         vec3 l;
         vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
-//@ if anisotropic
-        radiance += lf_brdf(n, v_tangent, v, l) * irradiance * max(dot(n, l), 0.0);
+//@ if tangent
+        radiance += lf_brdf(n, v_tangent, v, l@THERE@) * irradiance * max(dot(n, l), 0.0);
 //@ else
-        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+        radiance += lf_brdf(n, v, l@THERE@) * irradiance * max(dot(n, l), 0.0);
 //@ end
     }
     color = vec4(lf_output(radiance), 1.0);

@@ -3,8 +3,20 @@
 in vec3 v_wi;
 in vec3 v_wo;
 in vec3 v_weight;
+//@ if uv
+in vec2 v_uv;
+//@ end
+//@ if distance
+in float v_distance;
+//@ end
 out vec4 color;
 
 void main() {
-    color = vec4(lf_evaluate(v_wi, v_wo) * v_weight, 1.0);
+//@ if uv
+    vec2 uv = v_uv;
+//@ end
+//@ if distance
+    float distance = v_distance;
+//@ end
+    color = vec4(lf_evaluate(v_wi, v_wo@THERE@) * v_weight, 1.0);
 }

@@ -12,7 +12,7 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "layerfit"
 
 LADDER = [
-    {"errors", "documents", "_data", "_types", "_chunk", "_compiled", "_fields"},
+    {"errors", "documents", "_data", "_types", "_chunk", "_compiled", "_fields", "_place"},
     {"optics"},
     {"surfaces"},
     {"layers"},

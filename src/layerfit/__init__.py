@@ -3,7 +3,7 @@
 - Materials: Stack of Coat over Conductor, Dielectric, Lambert or OrenNayar, in the form Precise, Corrected or Faithful; read_preset, write_preset.
 - References: read_scene gives a Scene, load its View of each reference, from which Samples are drawn; inspect says what an EXR holds.
 - Fitting: fit gives a FitResult, parameters its values with sigmas; fit_scene does what `layerfit fit` does; image_error compares pictures.
-- Rendering: predict gives pixels, radiance the same traced, brdf the plain function.
+- Rendering: predict gives pixels, radiance the same traced, brdf the plain function; Place is where on the surface.
 - Shaders: print_material gives a Shader; shade_samples draws it; check_pairs and check_image compare it with JAX and give a Parity.
 - The machine: use_compilation_cache. Faults: InputError and MachineError, each a LayerfitError.
 

@@ -1,5 +1,6 @@
 # The public names, and where each is found. Read at run time too: it is the list that names are loaded by.
 
+from ._place import Place as Place
 from .cache import use_compilation_cache as use_compilation_cache
 from .capture.inspect import inspect as inspect
 from .capture.samples import Samples as Samples, View as View, load as load

@@ -9,34 +9,44 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ._compiled import Compiled
-from .stack import Stack, evaluate
+from ._place import Place
+from .stack import Stack, at, evaluate
 
 
 def radiance(
-    stack: Stack, wi: Float[Array, "n s 3"], wo: Float[Array, "n 3"], weight: Float[Array, "n s 3"]
+    stack: Stack,
+    wi: Float[Array, "n s 3"],
+    wo: Float[Array, "n 3"],
+    weight: Float[Array, "n s 3"],
+    place: Place | None = None,
 ) -> Float[Array, "n 3"]:
     """Linear radiance (n, 3) of n pixels with s light samples each; traced, for JAX to differentiate or compile.
 
     `wi` (n, s, 3) and `wo` (n, 3) are unit directions in the surface frame of each pixel; `weight` (n, s, 3) is what each light
-    sample brings per unit of BRDF: irradiance times cosine for a distant light.
+    sample brings per unit of BRDF: irradiance times cosine for a distant light. `place` holds (n, 2) texture coordinates and (n,)
+    distances, for materials that read them.
     """
-    return channels(stack, wi, wo, jnp.moveaxis(weight, -1, 0)).T
+    return channels(stack, wi, wo, jnp.moveaxis(weight, -1, 0), place).T
 
 
 def channels(
-    stack: Stack, wi: Float[Array, "n s 3"], wo: Float[Array, "n 3"], weight: Float[Array, "3 n s"]
+    stack: Stack,
+    wi: Float[Array, "n s 3"],
+    wo: Float[Array, "n 3"],
+    weight: Float[Array, "3 n s"],
+    place: Place | None = None,
 ) -> Float[Array, "3 n"]:
     """`radiance` with the channels first, in and out.
 
     None depends on another: what they share is computed once, and the loops of the compiled code run over pixels.
     """
     colours = jax.tree.map(lambda value: 0 if jnp.ndim(value) else None, stack)
-    return jax.vmap(_channel, in_axes=(colours, None, None, 0))(stack, wi, wo, weight)
+    return jax.vmap(_channel, in_axes=(colours, None, None, 0, None))(stack, wi, wo, weight, place)
 
 
-def _channel(stack: Stack, wi: Any, wo: Any, weight: Any) -> Any:
+def _channel(stack: Stack, wi: Any, wo: Any, weight: Any, place: Any) -> Any:
     prepared = _prepare(stack)
-    return jax.vmap(lambda wi, wo, weight: _pixel(stack.form, prepared, wi, wo, weight))(wi, wo, weight)
+    return jax.vmap(lambda *pixel: _pixel(stack.form, prepared, *pixel))(wi, wo, weight, place)
 
 
 # Units of their own for the tracer: a fit differentiates both once a parameter, from one trace.
@@ -44,7 +54,8 @@ _prepare = jax.jit(Stack.prepare)
 
 
 @partial(jax.jit, static_argnames="form")
-def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any) -> Any:
+def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any, place: Any) -> Any:
+    prepared = at(prepared, place)
     if wi.shape[0] == 1:  # one light needs no axis: the compiler would carry it through every intermediate value
         return evaluate(form, prepared, wi[0], wo) * weight[0]
     return jnp.sum(jax.vmap(lambda w: evaluate(form, prepared, w, wo))(wi) * weight)
@@ -61,10 +72,13 @@ def block_size(lights: int) -> int:
     return max(32, 2 ** ((16 * _BLOCK // lights).bit_length() - 1)) if lights > 16 else _BLOCK
 
 
-def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def predict(
+    stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, place: Place | None = None
+) -> np.ndarray:
     """Linear radiance (n, 3) of any number of pixels, computed in float32 and block by block.
 
-    `wi` and `weight` are (n, s, 3) for s light samples a pixel, channels last, and `wo` is (n, 3). Materials of the same structure share
+    `wi` and `weight` are (n, s, 3) for s light samples a pixel, channels last, and `wo` is (n, 3). `place` holds
+    (n, 2) texture coordinates and (n,) distances, for materials that read them; without it they are drawn as they are in the mean. Materials of the same structure share
     one executable for each s up to 512, and beyond it for equal parts of s.
     """
     pieces = -(-wi.shape[1] // _LIGHTS)
@@ -79,9 +93,10 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) ->
         for start in range(0, len(wo), size):
             to_light, to_eye, bright = (_padded(a[start : start + size], size) for a in (wi, wo, weight))
             bright = np.moveaxis(bright, -1, 0)
+            there = jax.tree.map(lambda a, start=start: _padded(a[start : start + size], size), place)
             lights = [slice(light, light + each) for light in range(0, pieces * each, each)]
             # All are started before the first is waited for.
-            sums = [_compiled(stack, to_light[:, some], to_eye, bright[:, :, some]) for some in lights]
+            sums = [_compiled(stack, to_light[:, some], to_eye, bright[:, :, some], there) for some in lights]
             rows.append(np.sum([np.asarray(part) for part in sums], 0).T)
     return np.concatenate(rows)[: len(wo)]
 
@@ -92,10 +107,20 @@ def _padded(a: np.ndarray, size: int) -> np.ndarray:
     return a if len(a) == size else np.concatenate([a, np.repeat(a[-1:], size - len(a), 0)])
 
 
-def brdf(stack: Stack, wi: Float[Array, "n 3"], wo: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
-    """BRDF (n, 3) [1/sr] of pairs of unit directions in the surface frame, `wi` (n, 3) and `wo` (n, 3); without the cosine."""
+def brdf(
+    stack: Stack, wi: Float[Array, "n 3"], wo: Float[Array, "n 3"], place: Place | None = None
+) -> Float[Array, "n 3"]:
+    """BRDF (n, 3) [1/sr] of pairs of unit directions in the surface frame, `wi` (n, 3) and `wo` (n, 3); without the cosine.
+
+    `place` holds (n, 2) texture coordinates and (n,) distances, for materials that read them.
+    """
     dtype = jnp.result_type(jnp.float32, wi, wo)
     stack = stack.astype(dtype)
     prepared = stack.prepare()
     wi, wo = (jnp.asarray(w, dtype) for w in (wi, wo))
-    return jax.vmap(lambda i, o: jnp.broadcast_to(evaluate(stack.form, prepared, i, o), (3,)))(wi, wo)
+    place = jax.tree.map(lambda a: jnp.asarray(a, dtype), place)
+
+    def one(i: Any, o: Any, there: Any) -> Any:
+        return jnp.broadcast_to(evaluate(stack.form, at(prepared, there), i, o), (3,))
+
+    return jax.vmap(one)(wi, wo, place)

@@ -7,12 +7,14 @@ import jax
 import jax.numpy as jnp
 
 from ._chunk import static, struct
+from ._place import Place, reads
 from ._types import Colour, Vec3
 from .forms import corrected, faithful, precise
 from .layers import Coat
 
 Form = faithful.Faithful | corrected.Corrected | precise.Precise
 FORMS = {faithful.Faithful: faithful, corrected.Corrected: corrected, precise.Precise: precise}
+PREPARED = faithful.Prepared | corrected.Prepared | precise.Prepared
 
 
 @struct
@@ -33,6 +35,11 @@ class Stack:
             return self.base
         return FORMS[type(self.form)].prepare(self.layers, self.base, self.form)
 
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """What this material reads of a `Place` of the surface: nothing where it is the same everywhere."""
+        return reads(*self.layers, self.base)
+
     def without(self, name: str) -> "Stack":
         """The same material with one layer taken off."""
         left = tuple(layer for layer in self.layers if layer.name != name)
@@ -41,9 +48,18 @@ class Stack:
         return replace(self, layers=left)
 
 
+def at(prepared: Any, place: Place | None) -> Any:
+    """A prepared material as it is at one place of the surface; without a place, as it is everywhere or in the mean."""
+    if place is None:
+        return prepared
+    if isinstance(prepared, PREPARED):
+        return replace(prepared, base=at(prepared.base, place))
+    return prepared.at(place) if reads(prepared) else prepared
+
+
 def evaluate(form: Form, prepared: Any, wi: Vec3, wo: Vec3) -> Colour:
     """BRDF [1/sr] of a prepared material for unit directions in the surface frame; 0 below the surface."""
-    if isinstance(prepared, (faithful.Prepared, corrected.Prepared, precise.Prepared)):
+    if isinstance(prepared, PREPARED):
         return FORMS[type(form)].evaluate(prepared, wi, wo, form)
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)

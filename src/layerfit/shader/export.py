@@ -13,10 +13,14 @@ from .. import __version__
 from .._chunk import CHUNKS
 from .._data import shaders
 from .._fields import params
+from .._place import TANGENT, Place, needs_tangent
 from ..forms.precise import BAKED, Precise
 from ..preset import left_out, model_name
-from ..stack import Stack, evaluate
+from ..stack import Stack, at, evaluate
 from .printer import PREFIX, Printer
+
+SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ())}
+"""What a material may read of a place: its type in the shader and in JAX."""
 
 HEADERS = {
     "glsl330": "#version 330 core",
@@ -37,9 +41,10 @@ class Shader:
     """Values of the uniforms, by name; empty where values are constants."""
 
     @property
-    def anisotropic(self) -> bool:
-        """Whether the BRDF asks for a tangent."""
-        return any(getattr(layer, "alpha_x", None) is not None for layer in (*self.stack.layers, self.stack.base))
+    def asks(self) -> frozenset[str]:
+        """What the BRDF asks for beside a normal and two directions: a tangent, texture coordinates, a distance."""
+        tangent = any(needs_tangent(layer) for layer in (*self.stack.layers, self.stack.base))
+        return frozenset(self.stack.reads) | ({TANGENT} if tangent else set())
 
     def text(self, target: str = "glsl330", file: str = "material.frag") -> str:
         """The whole fragment shader: a template of `shaders/` with this material in its slots."""
@@ -47,11 +52,10 @@ class Shader:
             "header": HEADERS[target],
             "about": self._about(),
             "material": self.functions,
-            "lights": template("lights.glsl", self.anisotropic),
-            "output": template("output.glsl", self.anisotropic),
+            "lights": template("lights.glsl", self.asks),
+            "output": template("output.glsl", self.asks),
         }
-        frame = "vec3 n, vec3 t, vec3 v, vec3 l" if self.anisotropic else "vec3 n, vec3 v, vec3 l"
-        text = template(file, self.anisotropic).replace("@FRAME@", frame)
+        text = template(file, self.asks)
         return re.sub(r"^//@ (\w+)$", lambda slot: slots[slot[1]].rstrip("\n"), text, flags=re.M)
 
     def _about(self) -> str:
@@ -72,6 +76,12 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
     stack = stack.astype(jnp.float32)
     printer = Printer(CHUNKS)
     w = jnp.array([0.0, 0.0, 1.0], jnp.float32)
+    inputs = [(w, "wi"), (w, "wo"), *((jnp.zeros(SIZES[name][1], jnp.float32), name) for name in stack.reads)]
+
+    def shade(prepared: Any, wi: Any, wo: Any, *place: Any) -> Any:
+        there = Place(**dict(zip(stack.reads, place, strict=True))) if place else None
+        return jnp.broadcast_to(evaluate(stack.form, at(prepared, there), wi, wo), (3,))
+
     if uniforms:
         rows, leaves = _uniforms(stack), jax.tree.leaves(stack)
         given = [row for row in rows if row]
@@ -80,10 +90,10 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
         structure = jax.tree.structure(stack)
 
         def local(*args: Any) -> Any:
-            free = iter(args[:-2])
+            free = iter(args[: -len(inputs)])
             values = [next(free) if row else leaf for row, leaf in zip(rows, leaves, strict=True)]
             live: Stack = jax.tree.unflatten(structure, values)
-            return jnp.broadcast_to(evaluate(live.form, live.prepare(), *args[-2:]), (3,))
+            return shade(live.prepare(), *args[-len(inputs) :])
 
         outside = [(leaf, name) for leaf, name, _, _ in given]
     else:
@@ -95,13 +105,13 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
         structure = jax.tree.structure(prepared)
 
         def local(*args: Any) -> Any:
-            live = jax.tree.unflatten(structure, jax.tree.leaves(args[:-2]))
-            return jnp.broadcast_to(evaluate(stack.form, live, *args[-2:]), (3,))
+            live = jax.tree.unflatten(structure, jax.tree.leaves(args[: -len(inputs)]))
+            return shade(live, *args[-len(inputs) :])
 
     local.__doc__ = "BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine."
-    printer.function(local, f"{PREFIX}evaluate", outside, [(w, "wi"), (w, "wo")])
+    printer.function(local, f"{PREFIX}evaluate", outside, inputs)
     shader = Shader(name, stack, "", values)
-    frame = template("brdf.glsl", shader.anisotropic)
+    frame = template("brdf.glsl", shader.asks)
     functions = "\n".join(part for part in (printer.structs_text(), declarations, printer.functions_text(), frame) if part)
     return dataclasses.replace(shader, functions=functions)
 
@@ -143,12 +153,21 @@ def _uniforms(stack: Stack) -> list[tuple[Any, str, str, str] | None]:
 
 
 @cache
-def template(file: str, anisotropic: bool) -> str:
-    """A file of `shaders/` with its conditional parts chosen."""
+def template(file: str, asks: frozenset[str]) -> str:
+    """A file of `shaders/` with its conditional parts chosen, and what the material asks for in its lists of parameters."""
     text = (shaders() / file).read_text()
+    names = [name for name in SIZES if name in asks]
+    lists = {
+        "@FRAME@": f"vec3 n, {'vec3 t, ' if TANGENT in asks else ''}vec3 v, vec3 l@PLACE@",
+        "@PLACE@": "".join(f", {SIZES[name][0]} {name}" for name in names),
+        "@THERE@": "".join(f", {name}" for name in names),
+    }
 
     def choose(match: re.Match[str]) -> str:
         yes, _, no = match[2].partition("//@ else\n")
-        return yes if anisotropic else no
+        return yes if match[1] in asks else no
 
-    return re.sub(r"^//@ if (anisotropic)\n(.*?)^//@ end\n", choose, text, flags=re.M | re.S)
+    text = re.sub(r"^//@ if (\w+)\n(.*?)^//@ end\n", choose, text, flags=re.M | re.S)
+    for word, parameters in lists.items():
+        text = text.replace(word, parameters)
+    return text

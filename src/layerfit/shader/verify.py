@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .._place import Place
 from ..documents import finite
 from ..render import predict
 from .export import Shader
@@ -60,9 +61,16 @@ def compare(shader: np.ndarray, model: np.ndarray, floor: float, describe: Any =
     )
 
 
-def shade_samples(shader: Shader, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Pixels (n, 3) that the printed functions make of samples: wi and weight (n, samples, 3), wo (n, 3)."""
+def shade_samples(
+    shader: Shader, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, place: Place | None = None
+) -> np.ndarray:
+    """Pixels (n, 3) that the printed functions make of samples: wi and weight (n, samples, 3), wo (n, 3).
+
+    `place` holds (n, 2) texture coordinates and (n,) distances, for a material that reads them.
+    """
     attributes = {"v_wi": np.swapaxes(wi, 0, 1), "v_wo": wo, "v_weight": np.swapaxes(weight, 0, 1)}
+    for name in shader.stack.reads:
+        attributes[f"v_{name}"] = np.reshape(getattr(place, name), (len(wo), -1))
     return shade_points(shader.text(file="samples.frag"), attributes, shader.uniforms)
 
 
@@ -75,10 +83,19 @@ def check_image(image: np.ndarray, model: np.ndarray, index: np.ndarray, width: 
 def check_pairs(shader: Shader, count: int = 65536, seed: int = 0) -> Parity:
     """Parity of the BRDF on random and extreme pairs of directions."""
     wi, wo = random_pairs(count, seed)
-    samples = wi[:, None], wo, np.ones_like(wi)[:, None]
+    place = random_places(count, seed)
+    samples = wi[:, None], wo, np.ones_like(wi)[:, None], place
     model, values = predict(shader.stack, *samples), shade_samples(shader, *samples)
-    describe = lambda row: {"wi": wi[row].tolist(), "wo": wo[row].tolist()}  # noqa: E731
+    where = {name: getattr(place, name) for name in shader.stack.reads}
+    describe = lambda row: {key: a[row].tolist() for key, a in {"wi": wi, "wo": wo, **where}.items()}  # noqa: E731
     return compare(values, model, FLOOR / np.pi, describe)
+
+
+def random_places(count: int, seed: int) -> Place:
+    """Texture coordinates over a few tiles, negative ones too, and distances from near to far; float32."""
+    rng = np.random.default_rng((seed, 1))
+    uv, distance = rng.uniform(-2.0, 2.0, (count, 2)), 10.0 ** rng.uniform(-2.0, 2.0, count)
+    return Place(uv.astype(np.float32), distance.astype(np.float32))
 
 
 def random_pairs(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,36 @@
+"""Where on a surface something is shaded: what a material that varies over the surface reads beside the two directions.
+
+Such a layer says in `reads` which of it, and gives by `at(place)` what it is there: a layer of the plain kind. All else of the
+model knows nothing of places, and neither has the shader of a material that is the same everywhere.
+"""
+
+import dataclasses
+from typing import Any
+
+from ._chunk import struct
+
+
+@struct
+class Place:
+    """A point of a surface; what the material does not read may be absent. A batch has an axis more."""
+
+    uv: Any = None
+    """Texture coordinates, (2,) or (n, 2)."""
+    distance: Any = None
+    """To the viewer, () or (n,), in the unit of the material's own distances."""
+
+
+INPUTS = tuple(field.name for field in dataclasses.fields(Place))
+TANGENT = "tangent"
+"""Read by what lies along the surface: in a shader, the frame then needs a tangent, as an anisotropic surface does."""
+
+
+def reads(*layers: Any) -> tuple[str, ...]:
+    """What these layers read of a place, in the order of `Place`."""
+    read = {name for layer in layers for name in getattr(layer, "reads", ())}
+    return tuple(name for name in INPUTS if name in read)
+
+
+def needs_tangent(layer: Any) -> bool:
+    """Whether a layer is laid along a tangent."""
+    return getattr(layer, "alpha_x", None) is not None or TANGENT in getattr(layer, "reads", ())
