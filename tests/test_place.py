@@ -25,7 +25,9 @@ class Ramp(Lambert):
     """A diffuse surface that gets darker along u and with the distance."""
 
     name: str = static(default="base", doc="name of the layer")
-    albedo: object = param(default=0.5, lower=0.0, upper=1.0, scale="linear", doc="part of the light that is sent back", colour=True)
+    albedo: object = param(
+        default=0.5, lower=0.0, upper=1.0, scale="linear", doc="part of the light that is sent back", colour=True
+    )
 
     reads = ("uv", "distance")
 

@@ -14,6 +14,8 @@ from .forms.faithful import Faithful as Faithful
 from .forms.precise import Precise as Precise
 from .job import fit_scene as fit_scene
 from .layers import Coat as Coat
+from .optics.metals import Metal as Metal, metal as metal
+from .optics.spectra import Absorption as Absorption, absorption_rgb as absorption_rgb
 from .preset import read_preset as read_preset, write_preset as write_preset
 from .render import brdf as brdf, predict as predict, radiance as radiance
 from .shader.export import Shader as Shader, print_material as print_material

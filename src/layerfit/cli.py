@@ -287,6 +287,38 @@ def truth(
 
 
 @app.command()
+def metal(
+    name: Annotated[
+        str | None, typer.Argument(help="Name, symbol or page: copper, Cu, Cu/McPeak. Left out: a list of names.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Print `eta` and `k` of a metal in three channels, from its measured optical constants, for a preset or a scene.
+
+    Example: `layerfit metal copper`
+    """
+    from .optics.metals import metal as find_metal, metal_names
+    from .preset import rounded
+
+    if name is None:
+        names = metal_names()
+        if as_json:
+            _emit(names)
+        else:
+            typer.echo("".join(f"{word:<12} {page}\n" for word, page in names.items()), nl=False)
+        return
+    found = find_metal(name)
+    document = {key: rounded(getattr(found, key)) for key in ("eta", "k", "f0")}
+    if as_json:
+        _emit({"name": name, **document, "source": found.source, "max_error": found.max_error, "delta_e": found.delta_e})
+        return
+    typer.echo("".join(f"{key} = {document[key]}\n" for key in ("eta", "k")), nl=False)
+    _say(f"reflectance at normal incidence {document['f0']}, linear Rec.709 of the spectrum under D65")
+    _say(f"three channels instead of the spectrum: off by at most {found.max_error:.2g}, delta E 2000 {found.delta_e:.2g}")
+    _say(f"from {found.source}")
+
+
+@app.command()
 def inspect(
     file: Annotated[Path, typer.Argument(help="EXR file.")],
     as_json: Json = False,

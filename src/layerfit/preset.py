@@ -21,8 +21,9 @@ from .forms.corrected import Corrected
 from .forms.faithful import Faithful
 from .forms.precise import Precise, refuses
 from .layers import LAYERS
+from .optics.metals import metal
 from .stack import Stack
-from .surfaces import BASES
+from .surfaces import BASES, Conductor
 
 SCHEMA = "layerfit/preset"
 VERSION = 1
@@ -157,7 +158,8 @@ def _layer(document: Any, kinds: Mapping[str, type], where: str) -> Any:
         raise InputError(f"{where}: type = {kind!r} is not one of {', '.join(kinds)}{nearest(str(kind), kinds)}")
     cls = kinds[kind]
     known = {field.name: field for field in dataclasses.fields(cls)}
-    check_keys(document, ("type", *known), where)
+    check_keys(document, ("type", *known, *(("metal",) if cls is Conductor else ())), where)
+    document = _named_metal(document, where)
     specs = dict(params(cls))
     values: dict[str, Any] = {}
     for key, value in document.items():
@@ -180,6 +182,19 @@ def _layer(document: Any, kinds: Mapping[str, type], where: str) -> Any:
     if "tau" in values and "absorption_per_mm" in values:
         raise InputError(f"{where}: give either tau, or absorption_per_mm and thickness_um; tau is their product")
     return cls(**values)
+
+
+def _named_metal(document: Mapping[str, Any], where: str) -> Mapping[str, Any]:
+    """A layer's document with the index in place of the name of a metal."""
+    if "metal" not in document:
+        return document
+    if "eta" in document or "k" in document:
+        raise InputError(f"{where}: give either metal, or eta and k; a metal's name stands for both")
+    if not isinstance(document["metal"], str):
+        raise InputError(f'{where}.metal = {document["metal"]!r}: should be a name, such as "Cu" or "copper"')
+    found = metal(document["metal"], f"{where}.metal")
+    others = {key: value for key, value in document.items() if key != "metal"}
+    return others | {"eta": rounded(found.eta), "k": rounded(found.k)}
 
 
 def _number(value: Any, spec: Param, where: str) -> Any:

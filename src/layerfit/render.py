@@ -72,14 +72,12 @@ def block_size(lights: int) -> int:
     return max(32, 2 ** ((16 * _BLOCK // lights).bit_length() - 1)) if lights > 16 else _BLOCK
 
 
-def predict(
-    stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, place: Place | None = None
-) -> np.ndarray:
+def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, place: Place | None = None) -> np.ndarray:
     """Linear radiance (n, 3) of any number of pixels, computed in float32 and block by block.
 
-    `wi` and `weight` are (n, s, 3) for s light samples a pixel, channels last, and `wo` is (n, 3). `place` holds
-    (n, 2) texture coordinates and (n,) distances, for materials that read them; without it they are drawn as they are in the mean. Materials of the same structure share
-    one executable for each s up to 512, and beyond it for equal parts of s.
+    `wi` and `weight` are (n, s, 3) for s light samples a pixel, channels last, and `wo` is (n, 3). `place` holds (n, 2) texture
+    coordinates and (n,) distances, for materials that read them; without it they are drawn as they are in the mean. Materials of the
+    same structure share one executable for each s up to 512, and beyond it for equal parts of s.
     """
     pieces = -(-wi.shape[1] // _LIGHTS)
     each = -(-wi.shape[1] // pieces)
@@ -107,9 +105,7 @@ def _padded(a: np.ndarray, size: int) -> np.ndarray:
     return a if len(a) == size else np.concatenate([a, np.repeat(a[-1:], size - len(a), 0)])
 
 
-def brdf(
-    stack: Stack, wi: Float[Array, "n 3"], wo: Float[Array, "n 3"], place: Place | None = None
-) -> Float[Array, "n 3"]:
+def brdf(stack: Stack, wi: Float[Array, "n 3"], wo: Float[Array, "n 3"], place: Place | None = None) -> Float[Array, "n 3"]:
     """BRDF (n, 3) [1/sr] of pairs of unit directions in the surface frame, `wi` (n, 3) and `wo` (n, 3); without the cosine.
 
     `place` holds (n, 2) texture coordinates and (n,) distances, for materials that read them.

@@ -61,9 +61,7 @@ def compare(shader: np.ndarray, model: np.ndarray, floor: float, describe: Any =
     )
 
 
-def shade_samples(
-    shader: Shader, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, place: Place | None = None
-) -> np.ndarray:
+def shade_samples(shader: Shader, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, place: Place | None = None) -> np.ndarray:
     """Pixels (n, 3) that the printed functions make of samples: wi and weight (n, samples, 3), wo (n, 3).
 
     `place` holds (n, 2) texture coordinates and (n,) distances, for a material that reads them.
