@@ -1,13 +1,31 @@
 """Patina: noise over a surface, growth in time, and the material that comes of them."""
 
+import dataclasses
+import subprocess
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from helpers import FLOOR, REL, cases, close
+from helpers import COPPER, FLOOR, REL, brdf_rows, cases, close, coat_of, hemisphere, surface_of
+from layerfit._compiled import Compiled
+from layerfit._place import Place
+from layerfit.errors import InputError
+from layerfit.forms import patina
+from layerfit.forms.corrected import Corrected
+from layerfit.forms.faithful import Faithful
+from layerfit.forms.growth import Cover
+from layerfit.forms.precise import Precise
+from layerfit.layers import Coat, Patina
 from layerfit.optics.growth import coverage, grown, onset, partly_grown, tarnish_thickness
 from layerfit.optics.noise import fbm, value_noise
+from layerfit.preset import preset_of, stack_of
+from layerfit.render import brdf, predict
+from layerfit.shader.export import HEADERS, print_material
+from layerfit.shader.verify import check_pairs
+from layerfit.stack import Stack, at, evaluate
+from layerfit.surfaces import Conductor, Lambert
 
 DTYPES = [np.float64, np.float32]
 
@@ -84,3 +102,183 @@ def test_growth_is_finite_at_its_edges(dtype):
         assert np.all(np.isfinite(values))
         assert np.all(np.asarray(values) >= 0.0)
         assert all(np.all(np.isfinite(s)) for s in slopes)
+
+
+METAL = Conductor(alpha=0.2, **COPPER)
+CRUST = {"absorbed": [0.8, 0.2, 0.4], "scattered": [0.5, 1.0, 0.8]}
+ONCE = {"albedo": [0.3, 0.6, 0.5], "depth": 0.8, "g": 0.2}
+PATINAS = {
+    "all": Stack((Patina(softness=0.05, tau=[0.5, 1.0, 2.0], weight=0.6, **ONCE, **CRUST),), METAL),
+    "film with a hard edge": Stack((Patina(absorption_per_mm=[300.0, 900.0, 2000.0], thickness_um=1.0),), METAL),
+    "crust": Stack((Patina(softness=0.1, eta=1.7, **CRUST),), METAL),
+    "trapped light": Stack((Patina(softness=0.1, tau=0.3),), METAL, Corrected(trapped=True)),
+    "faithful": Stack((Patina(softness=0.1, tau=0.3, masking="vcavity", **ONCE),), METAL, Faithful()),
+}
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """Pairs of directions at places of the surface."""
+    uv = np.random.default_rng(0).uniform(-2.0, 2.0, (256, 2))
+    return hemisphere(256, 1), hemisphere(256, 2), Place(uv)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_a_patina_has_its_digits(oracle, dtype):
+    for case in cases(oracle)["patina_brdf"]:
+        i = case["in"]
+        film = coat_of(i["coat"])
+        same = ("alpha", "alpha_x", "alpha_y", "eta", "tau", "distribution", "masking")
+        scattering = {"albedo": i["albedo"], "depth": i["tau_s"], "g": i["g"]}
+        crust = {"absorbed": i["K"] * i["x"], "scattered": i["S"] * i["x"]}
+        layer = Patina(**{field: getattr(film, field) for field in same}, **scattering, **crust)
+        covered = np.float32(i["m"]) if dtype == np.float32 else i["m"]
+        stack = Stack((layer,), surface_of(i["base"]), Corrected(trapped=True)).astype(dtype)
+        value = float(_at_spot(stack, covered, i["wi"], i["wo"], dtype))
+        wanted, rel = float(case["out"]), 10.0 * REL[dtype]
+        if dtype == np.float32:
+            wi, wo = (np.asarray(i[w], np.float32) for w in ("wi", "wo"))
+            wanted = float(_at_spot(jax.tree.map(lambda x: x.astype(np.float64), stack), covered, wi, wo, np.float64))
+            rel = 2e-2 if min(wi[2], wo[2]) < 1e-3 else rel
+        assert close(value, wanted, rel, FLOOR[dtype]), (value, wanted, i)
+
+
+def _at_spot(stack, covered, wi, wo, dtype):
+    cover = Cover(jnp.asarray(covered, dtype), jnp.asarray(1.0 - float(covered), dtype))
+    spot = patina.Spot(cover, jnp.ones((), dtype))
+    prepared = dataclasses.replace(stack.prepare(), spot=spot)
+    return evaluate(stack.form, prepared, jnp.asarray(wi, dtype), jnp.asarray(wo, dtype))
+
+
+@pytest.mark.parametrize("name", PATINAS)
+def test_parity_of_a_patina(gl, name):
+    parity = check_pairs(print_material(PATINAS[name], "test"), 16384)
+    assert parity.passed, parity
+
+
+@pytest.mark.parametrize("target", HEADERS)
+@pytest.mark.parametrize("uniforms", [False, True], ids=["constants", "uniforms"])
+@pytest.mark.parametrize("name", PATINAS)
+def test_a_patina_validates(name, uniforms, target, tmp_path):
+    path = tmp_path / "material.frag"
+    path.write_text(print_material(PATINAS[name], "test", uniforms).text(target))
+    run = subprocess.run(["glslangValidator", str(path)], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout
+
+
+def test_what_a_patina_does_without_is_not_in_its_text():
+    text = print_material(PATINAS["crust"], "crust").text()
+    assert "vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {" in text
+    assert "henyey" not in text
+    assert "tau" not in text
+    assert "kubelka" in text
+    assert "kubelka" not in print_material(PATINAS["film with a hard edge"], "film").text()
+
+
+@pytest.mark.parametrize("name", PATINAS)
+def test_a_patina_is_reciprocal_and_dark_below_the_surface(name, rows):
+    wi, wo, place = rows
+    stack = PATINAS[name].astype(np.float64)
+    each = Compiled(brdf)
+    there = np.asarray(each(stack, wi, wo, place))
+    np.testing.assert_allclose(there, each(stack, wo, wi, place), rtol=1e-11)
+    assert np.all(there > 0.0)
+    assert np.all(np.asarray(each(stack, wi * np.array([1.0, 1.0, -1.0]), wo, place)) == 0.0)
+
+
+def test_what_has_not_begun_is_bare_metal(rows):
+    wi, wo, place = rows
+    new = Stack((dataclasses.replace(PATINAS["film with a hard edge"].layers[0], years=0.0),), METAL).astype(np.float64)
+    np.testing.assert_allclose(brdf(new, wi, wo, place), brdf(Stack((), METAL).astype(np.float64), wi, wo), rtol=1e-14)
+
+
+def test_what_is_covered_for_long_is_film_and_crust_alone(rows):
+    """One onset time after it began the film is the coat that its fields describe."""
+    wi, wo, place = rows
+    layer = Patina(years=1e4, onset_years=1.0, blur=1e-3, tau=[0.002, 0.004, 0.008])
+    old = Stack((layer,), METAL).astype(np.float64)
+    coat = Coat(alpha=0.3, eta=2.7, tau=np.sqrt(1e4 - 1.0) * np.array([0.002, 0.004, 0.008]))
+    np.testing.assert_allclose(brdf(old, wi, wo, place), brdf_rows(Stack((coat,), METAL).astype(np.float64), wi, wo), rtol=2e-4)
+
+
+def test_the_mean_over_the_surface_is_near_the_mean_of_its_places():
+    many = 4096
+    wi, wo = (np.repeat(hemisphere(8, seed), many, 0) for seed in (1, 2))
+    place = Place(np.random.default_rng(1).uniform(-50.0, 50.0, (8 * many, 2)))
+    for years in (5.0, 8.0, 20.0):
+        stack = Stack((dataclasses.replace(PATINAS["all"].layers[0], years=years),), METAL)
+        pixels = lambda where, stack=stack: predict(stack, wi[:, None], wo, np.ones_like(wi)[:, None], where)  # noqa: E731
+        np.testing.assert_allclose(pixels(None)[::many], pixels(place).reshape(8, many, 3).mean(1), rtol=0.06)
+
+
+def _rows(stack, wi, wo, uv):
+    prepared = stack.prepare()
+    return jax.vmap(lambda i, o, p: evaluate(stack.form, at(prepared, Place(p)), i, o))(wi, wo, uv)
+
+
+# One executable for all that asks for the derivatives of one material.
+_values_and_slopes = Compiled(lambda inputs, tangents: jax.jvp(_rows, inputs, tangents))
+
+
+def _along(stack, **tangent):
+    """A step in some fields of the layer."""
+    still = jax.tree.map(jnp.zeros_like, stack)
+    tangent = {field: jnp.full_like(getattr(stack.layers[0], field), value) for field, value in tangent.items()}
+    return dataclasses.replace(still, layers=(dataclasses.replace(still.layers[0], **tangent),))
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_a_patina_has_finite_derivatives_at_its_edges(dtype):
+    edges = np.array([[0.0, 0.0, 1.0], [np.sqrt(1 - 1e-8), 0.0, 1e-4], [-np.sqrt(1 - 1e-8), 0.0, 1e-4]], dtype)
+    wi, wo = np.tile(np.repeat(edges, 3, 0), (2, 1))[:16], np.tile(edges, (6, 1))[:16]
+    uv = np.linspace(-1.0, 1.0, 32, dtype=dtype).reshape(16, 2)
+    for years in (0.0, 1e-3, 20.0, 1e4):
+        stack = Stack((dataclasses.replace(PATINAS["all"].layers[0], years=years),), METAL).astype(dtype)
+        inputs = (stack, wi, wo, uv)
+        values, slopes = _values_and_slopes(inputs, jax.tree.map(jnp.ones_like, inputs))
+        assert np.all(np.isfinite(values))
+        assert np.all(np.isfinite(slopes))
+
+
+def test_derivatives_of_a_patina_agree_with_differences(rows):
+    wi, wo, uv = rows[0][:16], rows[1][:16], rows[2].uv[:16]
+    stack = PATINAS["all"].astype(np.float64)
+    still = [jnp.zeros_like(x) for x in (wi, wo, uv)]
+    for field in ("years", "onset_years", "steepness", "softness", "blur", "cells", "depth", "weight"):
+        step = _along(stack, **{field: 1.0})
+        value = lambda h, step=step: _values_and_slopes(  # noqa: E731
+            (jax.tree.map(lambda x, d: x + h * d, stack, step), wi, wo, uv), (step, *still)
+        )
+        h = 1e-6 * float(getattr(stack.layers[0], field))
+        difference = (value(h)[0] - value(-h)[0]) / (2.0 * h)
+        np.testing.assert_allclose(value(0.0)[1], difference, rtol=1e-5, atol=1e-8)
+
+
+def test_a_patina_is_written_and_read():
+    stack = PATINAS["all"]
+    document = preset_of(stack, "all")
+    keys = {key: document[key] for key in ("model", "layers", "base")}
+    np.testing.assert_array_equal(stack_of(keys, "preset").layers[0].scattered, [0.5, 1.0, 0.8])
+    assert stack_of({key: keys[key] for key in ("layers", "base")}, "preset").form == Corrected()
+    assert document["left_out"] == ["patina: anisotropy", "base: anisotropy"]
+    assert "patina: crust" in preset_of(PATINAS["film with a hard edge"], "film")["left_out"]
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ({"layers": [{"type": "patina", "albedo": 0.5}], "base": {"type": "conductor"}}, "come together; depth, g is missing"),
+        ({"layers": [{"type": "patina"}], "base": {"type": "lambert"}}, "alone over a conductor; here its base is Lambert"),
+        ({"layers": [{"type": "coat"}, {"type": "patina"}], "base": {"type": "conductor"}}, "one of several layers"),
+        ({"model": "precise", "layers": [{"type": "patina"}], "base": {"type": "conductor"}}, "it has a patina"),
+    ],
+)
+def test_a_patina_that_cannot_be_is_refused(document, message):
+    with pytest.raises(InputError, match=message):
+        stack_of(document, "scene")
+
+
+@pytest.mark.parametrize("stack", [Stack((Patina(),), Lambert()), Stack((Patina(),), METAL, Precise())], ids=["base", "form"])
+def test_a_patina_that_cannot_be_is_refused_in_python(stack):
+    with pytest.raises(InputError, match="patina"):
+        stack.astype(np.float32).prepare()

@@ -17,6 +17,7 @@ from ._data import shaders
 from ._fields import Param, params
 from .documents import check_keys, nearest, read_document, write_text
 from .errors import InputError
+from .forms import patina
 from .forms.corrected import Corrected
 from .forms.faithful import Faithful
 from .forms.precise import Precise, refuses
@@ -102,6 +103,7 @@ def left_out(stack: Stack) -> list[str]:
     for layer in stack.layers:
         if layer.optical_depth is None:
             words.append(f"{layer.name}: absorption")
+        words += [f"{layer.name}: {lack}" for lack in getattr(layer, "lacks", ())]
     for layer in (*stack.layers, stack.base):
         if getattr(layer, "alpha", None) is not None:
             words.append(f"{layer.name}: anisotropy")
@@ -126,7 +128,9 @@ def stack_of(document: Mapping[str, Any], where: str) -> Stack:
 
 def form_of(document: Mapping[str, Any], layers: tuple[Any, ...], base: Any, where: str) -> Any:
     """The form of `model`, `interface` and `options`; without a model the precise one, for materials that it is for."""
-    reason = refuses(layers, base)
+    if problem := patina.refuses(layers, base):
+        raise InputError(f"{where}: {problem}")
+    reason = "it has a patina" if patina.grows(layers) else refuses(layers, base)
     model = document.get("model", "corrected" if reason else "precise")
     if model not in MODELS:
         raise InputError(f"{where}: model = {model!r} is not one of {', '.join(MODELS)}{nearest(str(model), MODELS)}")
@@ -181,6 +185,9 @@ def _layer(document: Any, kinds: Mapping[str, type], where: str) -> Any:
         )
     if "tau" in values and "absorption_per_mm" in values:
         raise InputError(f"{where}: give either tau, or absorption_per_mm and thickness_um; tau is their product")
+    for group in getattr(cls, "together", ()):
+        if missing := [key for key in group if key not in values] if any(key in values for key in group) else []:
+            raise InputError(f"{where}: {', '.join(group)} come together; {', '.join(missing)} is missing")
     return cls(**values)
 
 

@@ -9,8 +9,7 @@ import jax.numpy as jnp
 from ._chunk import static, struct
 from ._place import Place, reads
 from ._types import Colour, Vec3
-from .forms import corrected, faithful, precise
-from .layers import Coat
+from .forms import corrected, faithful, patina, precise
 
 Form = faithful.Faithful | corrected.Corrected | precise.Precise
 FORMS = {faithful.Faithful: faithful, corrected.Corrected: corrected, precise.Precise: precise}
@@ -21,7 +20,7 @@ PREPARED = faithful.Prepared | corrected.Prepared | precise.Prepared
 class Stack:
     """Layers over a base, outermost first. What a material does without is absent: no coat, no absorption."""
 
-    layers: tuple[Coat, ...]
+    layers: tuple[Any, ...]
     base: Any
     form: Form = static(corrected.Corrected())
 
@@ -33,6 +32,8 @@ class Stack:
         """What is computed once per material: the constants of its shader."""
         if not self.layers:
             return self.base
+        if patina.grows(self.layers):
+            return patina.prepare(self.layers, self.base, self.form)
         return FORMS[type(self.form)].prepare(self.layers, self.base, self.form)
 
     @property
@@ -52,6 +53,8 @@ def at(prepared: Any, place: Place | None) -> Any:
     """A prepared material as it is at one place of the surface; without a place, as it is everywhere or in the mean."""
     if place is None:
         return prepared
+    if isinstance(prepared, patina.Prepared):
+        return prepared.at(place)
     if isinstance(prepared, PREPARED):
         return replace(prepared, base=at(prepared.base, place))
     return prepared.at(place) if reads(prepared) else prepared
@@ -59,6 +62,8 @@ def at(prepared: Any, place: Place | None) -> Any:
 
 def evaluate(form: Form, prepared: Any, wi: Vec3, wo: Vec3) -> Colour:
     """BRDF [1/sr] of a prepared material for unit directions in the surface frame; 0 below the surface."""
+    if isinstance(prepared, patina.Prepared):
+        return patina.evaluate(prepared, wi, wo, form)
     if isinstance(prepared, PREPARED):
         return FORMS[type(form)].evaluate(prepared, wi, wo, form)
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)

@@ -235,14 +235,14 @@ def _weighted(block: Block, inverse_sigma: np.ndarray) -> Block:
 
 
 def _without_gauge(start: Stack, free: Sequence[str] | None) -> tuple[Sequence[str] | None, list[Held]]:
-    """Hold the thickness of a coat whose absorption is fitted too: images see their product alone, whatever the thicknesses."""
+    """Hold one of two fields that enter only together, such as the thickness of a coat whose absorption is fitted too."""
     held = []
     for layer in start.layers:
-        absorption, thickness = f"{layer.name}.absorption_per_mm", f"{layer.name}.thickness_um"
-        if free is not None and absorption in free and thickness in free:
-            free = [name for name in free if name != thickness]
-            why = f"absorption and thickness enter only as tau, their product; {thickness} was held at its start"
-            held.append(Held({absorption: 1.0, thickness: -1.0}, why))
+        for kept, other, why in getattr(layer, "gauges", ()):
+            first, second = f"{layer.name}.{kept}", f"{layer.name}.{other}"
+            if free is not None and first in free and second in free:
+                free = [name for name in free if name != second]
+                held.append(Held({first: 1.0, second: -1.0}, f"{why}; {second} was held at its start"))
     return free, held
 
 

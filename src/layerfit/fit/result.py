@@ -116,7 +116,7 @@ def parameters(result: FitResult) -> dict[str, dict[str, Any]]:
             "unit": f.spec.unit,
         }
     for layer in result.stack.layers:
-        if layer.absorption_per_mm is not None:
+        if getattr(layer, "absorption_per_mm", None) is not None:
             rows[f"{layer.name}.tau"] = _derived_tau(result, layer)
     return rows
 

@@ -115,7 +115,7 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Corrected) -> Prepared:
     returned = trapped = None
     if isinstance(base, Microfacets):
         if options.trapped:
-            trapped = _trapped(base, relative[-1].tau, n)
+            trapped = trapped_light(base, relative[-1].tau, n)
     else:
         returned = 1.0 / jnp.maximum(1.0 - base.albedo + base.albedo * _escape(relative, interfaces), 1e-6)
     return Prepared(tuple(relative), tuple(interfaces), base, returned, trapped)
@@ -317,7 +317,7 @@ def _power(x: Scalar, p: float) -> Scalar:
     return x * x if p == 2.0 else safe_power(x, p)
 
 
-def _trapped(base: Microfacets, tau: Colour | None, n: Scalar) -> Colour:
+def trapped_light(base: Microfacets, tau: Colour | None, n: Scalar) -> Colour:
     """Radiance factor [1/sr] of light kept below the coat by total reflection until a rough base frees it."""
     alpha = jnp.minimum(_mean_width(base.width), 1.0)
     a2 = alpha * alpha

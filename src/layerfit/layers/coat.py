@@ -40,6 +40,9 @@ class Coat(Microfacets):
     distribution: Distribution = choice(default="ggx", others=("beckmann",), doc="density of the facet normals")
     masking: Masking = choice(default="smith", others=("smith_separable", "vcavity"), doc="how facets hide one another")
 
+    gauges = (("absorption_per_mm", "thickness_um", "absorption and thickness enter only as tau, their product"),)
+    """Pairs of fields that an image cannot tell apart, and why."""
+
     @property
     def optical_depth(self) -> Colour | None:
         """tau [1], or None for a clear coat."""

@@ -14,9 +14,9 @@ OCTAVES = 4
 
 
 @chunk
-def corner_value(corner: Vec2, seed: UInt, like: Scalar) -> Scalar:
+def corner_value(corner: Vec2, seed: UInt) -> Scalar:
     """The random number in (0, 1) of one corner of the grid."""
-    return unit(hash_cell(corner, seed)[0], like)
+    return unit(hash_cell(corner, seed)[0], corner[0])
 
 
 @chunk
@@ -27,10 +27,10 @@ def value_noise(p: Vec2, seed: UInt) -> Scalar:
     fade = f * f * f * (f * (f * 6.0 - 15.0) + 10.0)
     right = jnp.array([1.0, 0.0], p.dtype)
     above = jnp.array([0.0, 1.0], p.dtype)
-    a = corner_value(cell, seed, f[0])
-    b = corner_value(cell + right, seed, f[0])
-    c = corner_value(cell + above, seed, f[0])
-    d = corner_value(cell + right + above, seed, f[0])
+    a = corner_value(cell, seed)
+    b = corner_value(cell + right, seed)
+    c = corner_value(cell + above, seed)
+    d = corner_value(cell + right + above, seed)
     lower = a + (b - a) * fade[0]
     upper = c + (d - c) * fade[0]
     return lower + (upper - lower) * fade[1]

@@ -16,7 +16,7 @@ from .._fields import params
 from .._place import TANGENT, Place, needs_tangent
 from ..forms.precise import BAKED, Precise
 from ..preset import left_out, model_name
-from ..stack import Stack, at, evaluate
+from ..stack import PREPARED, Stack, at, evaluate
 from .printer import PREFIX, Printer
 
 SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ())}
@@ -123,12 +123,14 @@ def _parts(stack: Stack, prepared: Any) -> list[tuple[str, Any]]:
     parts: list[tuple[str, Any]] = []
     for field in dataclasses.fields(prepared):
         value = getattr(prepared, field.name)
-        if isinstance(value, tuple):
+        if isinstance(value, PREPARED):
+            parts += _parts(stack, value)
+        elif isinstance(value, tuple):
             for layer, item in zip(stack.layers, value, strict=True):
                 own = isinstance(item, type(layer))
                 parts.append((layer.name if own else f"{layer.name}_{type(item).__name__.lower()}", item))
         elif isinstance(value, type(stack.base)):
-            parts.append((stack.base.name, value))
+            parts.append((stack.base.name if field.name == "base" else f"{stack.base.name}_{field.name}", value))
         elif dataclasses.is_dataclass(value):
             coat = stack.layers[0].name
             parts.append((coat if isinstance(value, type(stack.layers[0])) else f"{coat}_{field.name}", value))

@@ -113,11 +113,11 @@ class Printer:
         ]
         returned = None
         if len(jaxpr.outvars) > 1:
-            ((_, leaves),) = _group(info.result_paths, [v.aval for v in jaxpr.outvars])
             if not dataclasses.is_dataclass(notes.get("return")):
                 raise PrintError(
                     f"the chunk {name} returns several values: give them a struct, and the function its annotation"
                 )
+            ((_, leaves),) = _group(_result_paths(info, notes["return"]), [v.aval for v in jaxpr.outvars])
             returned = self.struct(notes["return"], leaves)
         body = Body(self, jaxpr, closed.consts)
         for (root, kind, struct), (_, leaves) in zip(params, groups, strict=True):
@@ -337,6 +337,14 @@ def _group(paths: Sequence[str], avals: Sequence[Any]) -> list[tuple[str, list[t
             groups.append((root, []))
         groups[-1][1].append((safe(leaf), glsl_type(aval)))
     return groups
+
+
+def _result_paths(info: Any, cls: Any) -> list[str]:
+    """Leaves of the struct that a chunk returns, as `result.field`."""
+    if all("." in path for path in info.result_paths):
+        return info.result_paths
+    # JAX finds the fields by building a struct of placeholders, which one that checks its arguments does not take.
+    return [f"result.{field.name}" for field in dataclasses.fields(cls)]
 
 
 def _comment(field: dataclasses.Field[Any]) -> str:

@@ -1,0 +1,164 @@
+"""The patina of a metal: bare metal where nothing has grown yet, elsewhere film and crust over it.
+
+f = (1 - M) f_metal + M (f_film + w (f_once + f_crust)), after Elek 2010: M is what is covered at a place, f_film the film as a coat over
+the metal, f_once light that is scattered once below the film's boundary, f_crust the diffuse crust. They are added, not stacked:
+the crust hides nothing of the film, so that the energy is the user's to keep, by the absorption of the film and by w.
+"""
+
+import dataclasses
+import math
+from typing import Any
+
+import jax.numpy as jnp
+
+from .._chunk import chunk, dot, member, struct
+from .._place import Place
+from .._types import Colour, Scalar, Vec3
+from ..errors import InputError
+from ..layers import Patina
+from ..optics.fresnel import transmittance_dielectric
+from ..optics.growth import onset, tarnish_thickness
+from ..optics.medium import refract_about_normal
+from ..optics.scattering import henyey_greenstein, kubelka_munk, scattered_back
+from ..surfaces import Conductor
+from . import corrected, faithful
+from .growth import Cover, Growth, cover_at, field_at, growth_of, mean_cover
+
+FORMS = {corrected.Corrected: corrected, faithful.Faithful: faithful}
+"""What the film can be computed in."""
+
+
+@struct
+class Crust:
+    """How a patina grows thicker, and what scatters light in it, one onset time after it began."""
+
+    blur: Scalar = member("time in which growth sets in, in onset times")
+    albedo: Colour | None = member("part that scatters, of the light that is met")
+    depth: Scalar | None = member("optical depth of what scatters once")
+    g: Any = member("mean cosine of scattering once")
+    absorbed: Colour | None = member("absorption of the crust, K times its thickness")
+    scattered: Colour | None = member("scattering of the crust, S times its thickness")
+    weight: Scalar | None = member("part of all scattered light that counts")
+
+
+@struct
+class Spot:
+    """A patina at one place."""
+
+    cover: Cover
+    thickness: Scalar = member("thickness there, over that of one onset time")
+
+
+@struct
+class Prepared:
+    """The film over the metal, the metal in air, how far the growth has come, and what scatters."""
+
+    film: Any
+    bare: Any
+    growth: Growth
+    crust: Crust
+    spot: Spot | None
+    """Absent for the mean over the surface."""
+
+    def at(self, place: Place) -> "Prepared":
+        """The patina of one place."""
+        g = field_at(place.uv, self.growth)
+        cover = cover_at(g, self.growth)
+        thickness = thickness_at(g, self.growth, self.crust.blur)
+        return dataclasses.replace(self, spot=Spot(cover, thickness))
+
+
+@chunk
+def thickness_at(g: Scalar, growth: Growth, blur: Scalar) -> Scalar:
+    """Thickness where the field is g, over that of one onset time after the growth of a place began."""
+    one = jnp.ones_like(g)
+    t_on = onset(g, one, growth.steepness)
+    return tarnish_thickness(growth.age, t_on, one, blur)
+
+
+def mean_spot(prepared: Prepared) -> Spot:
+    """What stands for a whole surface: the mean of what is covered, as thick as where the field has its mean of that."""
+    cover, g = mean_cover(prepared.growth)
+    return Spot(cover, thickness_at(g, prepared.growth, prepared.crust.blur))
+
+
+def grows(layers: tuple[Any, ...]) -> bool:
+    """Whether there is a patina among the layers."""
+    return any(isinstance(layer, Patina) for layer in layers)
+
+
+def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
+    """Why a patina cannot be where it is, or None."""
+    name = next((layer.name for layer in layers if isinstance(layer, Patina)), None)
+    if name is None or (len(layers) == 1 and isinstance(base, Conductor)):
+        return None
+    wrong = "it is one of several layers" if len(layers) > 1 else f"its base is {type(base).__name__}"
+    return f"{name} is a patina, which lies alone over a conductor; here {wrong}"
+
+
+def prepare(layers: tuple[Any, ...], base: Any, form: Any) -> Prepared:
+    """The film's constants in its form, and how far the growth has come. Raises `InputError` where a patina cannot be."""
+    if reason := refuses(layers, base):
+        raise InputError(reason)
+    if type(form) not in FORMS:
+        raise InputError(f"a patina has no {type(form).__name__.lower()} form: use corrected or faithful")
+    (layer,) = layers
+    return Prepared(
+        film=FORMS[type(form)].prepare((layer.film,), base, form),
+        bare=base,
+        growth=growth_of(layer),
+        crust=Crust(**{field.name: getattr(layer, field.name) for field in dataclasses.fields(Crust)}),
+        spot=None,
+    )
+
+
+def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
+    """BRDF [1/sr] of unit directions above the surface; 0 where either is below it. `form` is that of the film."""
+    lit = (wi[2] > 0.0) & (wo[2] > 0.0)
+    up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
+    wi = jnp.where(lit, wi, up)
+    wo = jnp.where(lit, wo, up)
+    spot = prepared.spot or mean_spot(prepared)
+    film = _as_thick(prepared.film, spot.thickness)
+    patina = FORMS[type(form)].evaluate(film, wi, wo, form)
+    scattered = _scattered(prepared.crust, film.coats[0].eta, spot.thickness, wi, wo)
+    if scattered is not None:
+        patina = patina + scattered
+    bare = prepared.bare.evaluate(wi, wo)
+    f = spot.cover.bare * bare + spot.cover.covered * patina
+    return jnp.where(lit, f, 0.0)
+
+
+def _as_thick(film: Any, thickness: Scalar) -> Any:
+    """The film where it is so many times as thick."""
+    (coat,) = film.coats
+    if coat.tau is None:
+        return film
+    tau = coat.tau * thickness
+    film = dataclasses.replace(film, coats=(dataclasses.replace(coat, tau=tau),))
+    if getattr(film, "trapped", None) is None:
+        return film
+    return dataclasses.replace(film, trapped=corrected.trapped_light(film.base, tau, coat.eta))
+
+
+def _scattered(crust: Crust, eta: Scalar, thickness: Scalar, wi: Vec3, wo: Vec3) -> Colour | None:
+    """Light that film and crust scatter, or None where neither does."""
+    total: Any = None
+    if crust.albedo is not None and crust.depth is not None:
+        once = scattered_once(wi, wo, eta, crust.albedo, crust.depth * thickness, crust.g)
+        total = once
+    if crust.absorbed is not None and crust.scattered is not None:
+        layer = kubelka_munk(crust.absorbed * thickness, crust.scattered * thickness)
+        diffuse = layer.R / math.pi
+        total = diffuse if total is None else total + diffuse
+    return total if total is None or crust.weight is None else crust.weight * total
+
+
+@chunk
+def scattered_once(wi: Vec3, wo: Vec3, eta: Scalar, albedo: Colour, depth: Scalar, g: Scalar) -> Colour:
+    """BRDF [1/sr] of light that is scattered once below a smooth boundary (Hanrahan and Krueger 1993)."""
+    T = transmittance_dielectric(wi[2], eta) * transmittance_dielectric(wo[2], eta)
+    wi = refract_about_normal(wi, eta)
+    wo = refract_about_normal(wo, eta)
+    phase = henyey_greenstein(1.0 + dot(wi, wo), g)
+    return T / (eta * eta) * scattered_back(phase, albedo, depth, wi[2], wo[2])

@@ -1,0 +1,97 @@
+"""What grows on a metal in time: an oxide film, and a mineral crust that scatters light."""
+
+from .._chunk import static
+from .._fields import choice, layer, param
+from .._types import Colour, Number
+from ..optics.microfacet import Distribution, Masking
+from ..surfaces.microfacet import alpha_param
+from .coat import Coat
+from .growing import Growing
+
+
+@layer
+class Patina(Growing):
+    """A film and a crust that cover a metal place by place, and thicken there by the parabolic law of tarnish (Elek 2010).
+
+    `tau` (or `absorption_per_mm` and `thickness_um`) is of the film; `albedo`, `depth` and `g` are of scattering once below its boundary
+    (Hanrahan and Krueger 1993), `absorbed` and `scattered` of the diffuse crust (Kubelka and Munk 1931). They are as they stand one onset
+    time after a place was reached, and grow with the film. A patina is of age and onset by their ratio alone.
+    """
+
+    name: str = static(default="patina", doc="name of the layer")
+    blur: Number = param(
+        default=0.05, lower=1e-3, upper=1.0, scale="log", doc="time in which growth sets in, in onset times", fitted=False
+    )
+    alpha: Number = alpha_param(default=0.3, which="")
+    alpha_x: Number = alpha_param(default=None, which=" along the tangent")
+    alpha_y: Number = alpha_param(default=None, which=" across the tangent")
+    eta: Number = param(default=2.7, lower=1.0, upper=4.0, scale="linear", doc="index of refraction of the film, against air")
+    tau: Number = param(
+        default=None,
+        lower=0.0,
+        upper=50.0,
+        scale="softlog",
+        doc="optical depth of the film, one way at normal incidence",
+        colour=True,
+        soft=0.05,
+    )
+    absorption_per_mm: Number = param(
+        default=None, lower=0.0, upper=1e5, scale="softlog", doc="absorption coefficient of the film", unit="1/mm", colour=True
+    )
+    thickness_um: Number = param(
+        default=None, lower=1e-3, upper=5e3, scale="log", doc="thickness of the film", unit="um", fitted=False
+    )
+    albedo: Number = param(
+        default=None, lower=0.0, upper=1.0, scale="linear", doc="part that scatters, of the light that is met", colour=True
+    )
+    depth: Number = param(
+        default=None, lower=0.0, upper=50.0, scale="softlog", doc="optical depth of what scatters once", soft=0.05, fitted=False
+    )
+    g: Number = param(default=None, lower=-0.95, upper=0.95, scale="linear", doc="mean cosine of scattering once", fitted=False)
+    absorbed: Number = param(
+        default=None,
+        lower=0.0,
+        upper=100.0,
+        scale="softlog",
+        doc="absorption of the crust, K times its thickness",
+        colour=True,
+        soft=0.05,
+    )
+    scattered: Number = param(
+        default=None,
+        lower=0.0,
+        upper=100.0,
+        scale="softlog",
+        doc="scattering of the crust, S times its thickness",
+        colour=True,
+        soft=0.05,
+    )
+    weight: Number = param(
+        default=None, lower=0.0, upper=1.0, scale="linear", doc="part of all scattered light that counts; absent for the whole"
+    )
+    distribution: Distribution = choice(default="ggx", others=("beckmann",), doc="density of the facet normals")
+    masking: Masking = choice(default="smith", others=("smith_separable", "vcavity"), doc="how facets hide one another")
+
+    together = (("albedo", "depth", "g"), ("absorbed", "scattered"))
+    """Fields that are given all or not at all."""
+    gauges = (*Coat.gauges, ("years", "onset_years", "age and onset enter only as their ratio"))
+    """Pairs of fields that an image cannot tell apart, and why."""
+
+    @property
+    def lacks(self) -> list[str]:
+        """What it does without, in words."""
+        parts = {"soft edge": self.softness, "scattering once": self.albedo, "crust": self.scattered}
+        return [words for words, value in parts.items() if value is None]
+
+    @property
+    def optical_depth(self) -> Colour | None:
+        """tau [1] of the film, or None for a clear one."""
+        if self.absorption_per_mm is None:
+            return self.tau
+        return self.absorption_per_mm * (self.thickness_um * 1e-3)
+
+    @property
+    def film(self) -> Coat:
+        """The film as a coat."""
+        kept = ("name", "alpha", "alpha_x", "alpha_y", "eta", "distribution", "masking")
+        return Coat(**{field: getattr(self, field) for field in kept}, tau=self.optical_depth)
