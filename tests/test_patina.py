@@ -270,7 +270,7 @@ def test_a_patina_is_written_and_read():
         ({"layers": [{"type": "patina", "albedo": 0.5}], "base": {"type": "conductor"}}, "come together; depth, g is missing"),
         ({"layers": [{"type": "patina"}], "base": {"type": "lambert"}}, "alone over a conductor; here its base is Lambert"),
         ({"layers": [{"type": "coat"}, {"type": "patina"}], "base": {"type": "conductor"}}, "one of several layers"),
-        ({"model": "precise", "layers": [{"type": "patina"}], "base": {"type": "conductor"}}, "it has a patina"),
+        ({"model": "precise", "layers": [{"type": "patina"}], "base": {"type": "conductor"}}, "it changes in time"),
     ],
 )
 def test_a_patina_that_cannot_be_is_refused(document, message):

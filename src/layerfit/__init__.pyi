@@ -13,7 +13,14 @@ from .forms.corrected import Corrected as Corrected
 from .forms.faithful import Faithful as Faithful
 from .forms.precise import Precise as Precise
 from .job import fit_scene as fit_scene
-from .layers import Coat as Coat, Patina as Patina
+from .layers import (
+    Coat as Coat,
+    Deposit as Deposit,
+    Erosion as Erosion,
+    Overgrowth as Overgrowth,
+    Patina as Patina,
+    Polish as Polish,
+)
 from .optics.metals import Metal as Metal, metal as metal
 from .optics.spectra import Absorption as Absorption, absorption_rgb as absorption_rgb
 from .preset import read_preset as read_preset, write_preset as write_preset

@@ -17,13 +17,12 @@ from ._data import shaders
 from ._fields import Param, params
 from .documents import check_keys, nearest, read_document, write_text
 from .errors import InputError
-from .forms import patina
 from .forms.corrected import Corrected
 from .forms.faithful import Faithful
 from .forms.precise import Precise, refuses
 from .layers import LAYERS
 from .optics.metals import metal
-from .stack import Stack
+from .stack import IN_TIME, Stack
 from .surfaces import BASES, Conductor
 
 SCHEMA = "layerfit/preset"
@@ -101,11 +100,11 @@ def left_out(stack: Stack) -> list[str]:
     if not stack.layers:
         words.append("coat")
     for layer in stack.layers:
-        if layer.optical_depth is None:
+        if hasattr(layer, "optical_depth") and layer.optical_depth is None:
             words.append(f"{layer.name}: absorption")
         words += [f"{layer.name}: {lack}" for lack in getattr(layer, "lacks", ())]
     for layer in (*stack.layers, stack.base):
-        if getattr(layer, "alpha", None) is not None:
+        if hasattr(layer, "alpha_x") and layer.alpha is not None:
             words.append(f"{layer.name}: anisotropy")
     return words
 
@@ -128,9 +127,11 @@ def stack_of(document: Mapping[str, Any], where: str) -> Stack:
 
 def form_of(document: Mapping[str, Any], layers: tuple[Any, ...], base: Any, where: str) -> Any:
     """The form of `model`, `interface` and `options`; without a model the precise one, for materials that it is for."""
-    if problem := patina.refuses(layers, base):
-        raise InputError(f"{where}: {problem}")
-    reason = "it has a patina" if patina.grows(layers) else refuses(layers, base)
+    for kind in IN_TIME:
+        if problem := kind.refuses(layers, base):
+            raise InputError(f"{where}: {problem}")
+    in_time = any(kind.grows(layers) for kind in IN_TIME)
+    reason = "it changes in time" if in_time else refuses(layers, base)
     model = document.get("model", "corrected" if reason else "precise")
     if model not in MODELS:
         raise InputError(f"{where}: model = {model!r} is not one of {', '.join(MODELS)}{nearest(str(model), MODELS)}")
@@ -179,7 +180,7 @@ def _layer(document: Any, kinds: Mapping[str, type], where: str) -> Any:
         if "alpha" in values:
             raise InputError(f"{where}: give either alpha, or alpha_x and alpha_y")
         values["alpha"] = None
-    if ("absorption_per_mm" in values) != ("thickness_um" in values):
+    if "absorption_per_mm" in specs and ("absorption_per_mm" in values) != ("thickness_um" in values):
         raise InputError(
             f"{where}: absorption_per_mm and thickness_um come together; where neither is known give their product tau"
         )

@@ -9,10 +9,12 @@ import jax.numpy as jnp
 from ._chunk import static, struct
 from ._place import Place, reads
 from ._types import Colour, Vec3
-from .forms import corrected, faithful, patina, precise
+from .forms import corrected, faithful, patina, precise, weathering
 
 Form = faithful.Faithful | corrected.Corrected | precise.Precise
 FORMS = {faithful.Faithful: faithful, corrected.Corrected: corrected, precise.Precise: precise}
+IN_TIME = (patina, weathering)
+"""What a metal comes to in time: it is evaluated in a way of its own, whatever the form."""
 PREPARED = faithful.Prepared | corrected.Prepared | precise.Prepared
 
 
@@ -32,8 +34,9 @@ class Stack:
         """What is computed once per material: the constants of its shader."""
         if not self.layers:
             return self.base
-        if patina.grows(self.layers):
-            return patina.prepare(self.layers, self.base, self.form)
+        for kind in IN_TIME:
+            if kind.grows(self.layers):
+                return kind.prepare(self.layers, self.base, self.form)
         return FORMS[type(self.form)].prepare(self.layers, self.base, self.form)
 
     @property
@@ -53,7 +56,7 @@ def at(prepared: Any, place: Place | None) -> Any:
     """A prepared material as it is at one place of the surface; without a place, as it is everywhere or in the mean."""
     if place is None:
         return prepared
-    if isinstance(prepared, patina.Prepared):
+    if isinstance(prepared, (patina.Prepared, weathering.Prepared)):
         return prepared.at(place)
     if isinstance(prepared, PREPARED):
         return replace(prepared, base=at(prepared.base, place))
@@ -62,8 +65,9 @@ def at(prepared: Any, place: Place | None) -> Any:
 
 def evaluate(form: Form, prepared: Any, wi: Vec3, wo: Vec3) -> Colour:
     """BRDF [1/sr] of a prepared material for unit directions in the surface frame; 0 below the surface."""
-    if isinstance(prepared, patina.Prepared):
-        return patina.evaluate(prepared, wi, wo, form)
+    for kind in IN_TIME:
+        if isinstance(prepared, kind.Prepared):
+            return kind.evaluate(prepared, wi, wo, form)
     if isinstance(prepared, PREPARED):
         return FORMS[type(form)].evaluate(prepared, wi, wo, form)
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)

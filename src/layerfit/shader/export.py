@@ -14,6 +14,7 @@ from .._chunk import CHUNKS
 from .._data import shaders
 from .._fields import params
 from .._place import TANGENT, Place, needs_tangent
+from ..forms import weathering
 from ..forms.precise import BAKED, Precise
 from ..preset import left_out, model_name
 from ..stack import PREPARED, Stack, at, evaluate
@@ -65,6 +66,8 @@ class Shader:
             f"Printed by layerfit {__version__} from its {model_name(self.stack)} form.",
             f"Left out, because this material does without: {', '.join(left_out(self.stack)) or 'nothing'}.",
         ]
+        if weathering.grows(self.stack.layers):
+            return "\n".join(f"// {line}" for line in [lines[0], f"Printed by layerfit {__version__}.", *lines[2:]])
         covered = (*self.stack.layers, self.stack.base)[1:]
         if not self.uniforms and any(name == "eta" for layer in covered for name, _ in params(layer)):
             lines += ["Indices of refraction are relative to the layer above: its own index divides those in the preset."]
@@ -128,6 +131,8 @@ def _parts(stack: Stack, prepared: Any) -> list[tuple[str, Any]]:
         elif isinstance(value, tuple):
             for layer, item in zip(stack.layers, value, strict=True):
                 own = isinstance(item, type(layer))
+                if item is None:
+                    continue
                 parts.append((layer.name if own else f"{layer.name}_{type(item).__name__.lower()}", item))
         elif isinstance(value, type(stack.base)):
             parts.append((stack.base.name if field.name == "base" else f"{stack.base.name}_{field.name}", value))
