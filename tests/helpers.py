@@ -20,7 +20,17 @@ from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
 from layerfit.stack import Stack, evaluate
-from layerfit.surfaces import Conductor, Dielectric, Lambert, OrenNayar
+from layerfit.surfaces import (
+    Blinn,
+    Conductor,
+    CookTorrance,
+    Dielectric,
+    Lafortune,
+    Lambert,
+    OrenNayar,
+    Phong,
+    TorranceSparrow,
+)
 
 REL = {np.float64: 1e-12, np.float32: 1e-5}
 FLOOR = {np.float64: 1e-13, np.float32: 1e-6}
@@ -103,6 +113,10 @@ def hemisphere(count: int, seed: int = 0) -> np.ndarray:
     return np.stack([s * np.cos(phi), s * np.sin(phi), z], -1)
 
 
+WOOD = [0.5, 0.28, 0.13]
+LAFORTUNE = Lafortune(kd=WOOD, ks=[1.5, 1.2, 0.9], cx=-0.98, cz=0.97, exponent=30.0)
+
+
 def varnish(**coat: Any) -> Coat:
     """A coat with all that a coat can have."""
     return Coat(**({"alpha": 0.1, "eta": 1.5, "tau": [0.05, 0.2, 0.6]} | coat))
@@ -120,6 +134,16 @@ STACKS: dict[str, Stack] = {
     "lambert": Stack((), Lambert(albedo=[0.5, 0.28, 0.13])),
     "oren_nayar": Stack((), OrenNayar(albedo=[0.5, 0.28, 0.13], sigma=0.4)),
     "oren_nayar, qualitative": Stack((), OrenNayar(albedo=0.5, sigma=0.4, form="qualitative")),
+    "phong": Stack((), Phong(kd=WOOD, ks=0.3, exponent=80.0)),
+    "phong, faithful": Stack((), Phong(ks=0.1, exponent=40.0, scaling="faithful")),
+    "blinn": Stack((), Blinn(kd=WOOD, ks=0.2, exponent=300.0)),
+    "lafortune": Stack((), LAFORTUNE),
+    "lafortune, two lobes with a grain": Stack(
+        (), Lafortune(ks=0.5, cx=-0.9, cy=-1.02, ks_2=[0.02, 0.01, 0.02], cx_2=0.7, cz_2=0.7, exponent_2=4.0)
+    ),
+    "torrance_sparrow": Stack((), TorranceSparrow(ks=12.0, kappa=7.0, kd=0.1, **COPPER)),
+    "cook_torrance": Stack((), CookTorrance(alpha=0.25, ks=0.6, kd=[0.1, 0.05, 0.02], **COPPER)),
+    "corrected over lafortune": Stack((varnish(),), LAFORTUNE),
     "corrected over conductor": Stack((varnish(),), Conductor(alpha=0.2, **COPPER)),
     "corrected, narrow": Stack((varnish(alpha=0.02),), Conductor(alpha=0.02, **COPPER)),
     "corrected with trapped light": Stack((varnish(),), Conductor(alpha=0.4, **COPPER), Corrected(trapped=True)),
@@ -156,3 +180,14 @@ STACKS: dict[str, Stack] = {
     ),
 }
 """One material of every structure, for tests that all of them must pass."""
+
+BELOW_COATS: dict[str, Stack] = {
+    "corrected over phong": Stack((varnish(),), Phong(kd=WOOD, ks=[0.3, 0.2, 0.1], exponent=80.0)),
+    "corrected over blinn": Stack((varnish(),), Blinn(kd=WOOD, ks=0.2, exponent=300.0)),
+    "corrected over lafortune with a grain": Stack((varnish(),), Lafortune(ks=0.5, cx=-0.9, cy=-1.02)),
+    "corrected over torrance_sparrow": Stack((varnish(tau=None),), TorranceSparrow(ks=12.0, kappa=7.0, **COPPER)),
+    "corrected over cook_torrance": Stack((varnish(),), CookTorrance(alpha=0.25, ks=0.6, kd=0.2, **COPPER)),
+    "corrected over phong, faithful": Stack((varnish(),), Phong(kd=0.1, ks=0.1, exponent=40.0, scaling="faithful")),
+    "faithful over blinn": Stack((varnish(),), Blinn(kd=0.1, ks=0.2, exponent=20.0, scaling="faithful"), Faithful()),
+}
+"""The bases that say little new below a coat: for fewer tests."""

@@ -20,7 +20,15 @@ from layerfit.fit.words import measured
 from layerfit.layers import Coat
 from layerfit.render import predict
 from layerfit.stack import Stack
-from layerfit.surfaces import Conductor, Lambert
+from layerfit.surfaces import (
+    Blinn,
+    Conductor,
+    CookTorrance,
+    Lafortune,
+    Lambert,
+    Phong,
+    TorranceSparrow,
+)
 
 CAMERA = Camera((0.8, 0.6, 4.9), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0)
 SUN = Directional((0.46175709, 0.55410852, 0.69263564), (np.pi, np.pi, np.pi))
@@ -67,6 +75,31 @@ def test_an_image_of_the_model_gives_its_parameters_back(clean):
     for name, wanted in {"coat.alpha": 0.12, "coat.eta": 1.5, "coat.tau": [0.08, 0.25, 0.7], "base.alpha": 0.2}.items():
         np.testing.assert_allclose(found[name], wanted, rtol=2e-3, err_msg=name)
     assert clean.cost < 1e-6 * sum(s.target.size for s in clean.samples)
+
+
+CLASSIC = {
+    "phong": (Phong(kd=0.3, ks=0.4, exponent=40.0), {"kd": 0.5, "ks": 0.2, "exponent": 15.0}),
+    "blinn": (Blinn(kd=0.3, ks=0.4, exponent=80.0), {"kd": 0.5, "ks": 0.2, "exponent": 30.0}),
+    "lafortune": (
+        Lafortune(kd=0.3, ks=1.2, cx=-0.97, exponent=12.0),
+        {"kd": 0.5, "ks": 0.8, "cx": -1.0, "exponent": 20.0},
+    ),
+    "torrance_sparrow": (
+        TorranceSparrow(kd=0.1, ks=9.0, kappa=5.0, **COPPER),
+        {"kd": 0.3, "ks": 5.0, "kappa": 8.0},
+    ),
+    "cook_torrance": (CookTorrance(kd=0.1, ks=0.7, alpha=0.3, **COPPER), {"kd": 0.3, "ks": 0.4, "alpha": 0.15}),
+}
+"""A classic surface, and where to start from."""
+
+
+@pytest.mark.parametrize("name", CLASSIC)
+def test_a_classic_surface_is_found(see, name):
+    truth, start = CLASSIC[name]
+    result = fit([see(Stack((), truth))], Stack((), dataclasses.replace(truth, **start)), starts=1)
+    assert result.converged
+    for field in start:
+        np.testing.assert_allclose(values(result)[f"base.{field}"], getattr(truth, field), rtol=3e-3, err_msg=field)
 
 
 def test_what_is_not_asked_for_stays(clean):

@@ -159,7 +159,7 @@ def test_each_correction_earns_its_place(oracle):
         assert median(worse, "multi", "conductor") > median(full, "multi", "conductor"), part
 
 
-NOT_RECIPROCAL = {"faithful at the normal"}
+NOT_RECIPROCAL = {"faithful at the normal", "phong, faithful"}
 
 
 @pytest.mark.parametrize("name", STACKS)
@@ -168,7 +168,8 @@ def test_reciprocity(name):
     wi, wo = hemisphere(ROWS, 1), hemisphere(ROWS, 2)
     there, back = brdf_rows(stack, wi, wo), brdf_rows(stack, wo, wi)
     if name in NOT_RECIPROCAL:
-        assert float(jnp.max(jnp.abs(there - back) / there)) > 0.1  # t contains T21 alone
+        # t contains T21 alone; the published lobe is over NoL.
+        assert float(jnp.max(jnp.abs(there - back) / (there + 1e-6))) > 0.1
     else:
         np.testing.assert_allclose(there, back, rtol=1e-11)
 

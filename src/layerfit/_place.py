@@ -33,4 +33,4 @@ def reads(*layers: Any) -> tuple[str, ...]:
 
 def needs_tangent(layer: Any) -> bool:
     """Whether a layer is laid along a tangent."""
-    return getattr(layer, "alpha_x", None) is not None or TANGENT in getattr(layer, "reads", ())
+    return getattr(layer, "grain", None) is not None or TANGENT in getattr(layer, "reads", ())

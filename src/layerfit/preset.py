@@ -106,6 +106,8 @@ def left_out(stack: Stack) -> list[str]:
     for layer in (*stack.layers, stack.base):
         if hasattr(layer, "alpha_x") and layer.alpha is not None:
             words.append(f"{layer.name}: anisotropy")
+    if getattr(stack.base, "kd", 0.0) is None:
+        words.append(f"{stack.base.name}: diffuse part")
     return words
 
 
@@ -155,7 +157,7 @@ def form_of(document: Mapping[str, Any], layers: tuple[Any, ...], base: Any, whe
     return form(**options)
 
 
-def _layer(document: Any, kinds: Mapping[str, type], where: str) -> Any:
+def _layer(document: Any, kinds: Mapping[str, Any], where: str) -> Any:
     if not isinstance(document, Mapping):
         raise InputError(f"{where}: should be a table of keys, not {document!r}")
     kind = document.get("type")

@@ -72,4 +72,6 @@ def evaluate(form: Form, prepared: Any, wi: Vec3, wo: Vec3) -> Colour:
         return FORMS[type(form)].evaluate(prepared, wi, wo, form)
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    return jnp.where(lit, prepared.evaluate(jnp.where(lit, wi, up), jnp.where(lit, wo, up)), 0.0)
+    wi = jnp.where(lit, wi, up)
+    wo = jnp.where(lit, wo, up)
+    return jnp.where(lit, prepared.evaluate(wi, wo), 0.0)

@@ -228,7 +228,8 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
     V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    vec3 lobes = D * V / max(1.0 - q, 1e-06);
+    float lobe = D * V;
+    vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total = spread + 2.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
     total = total + pow(max(lf_coat.alpha, 1e-30), 1.34);
     width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
@@ -236,16 +237,18 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
     V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    lobes = D * V + q * lobes;
+    lobe = D * V;
+    lobes = lobe + q * lobes;
     total = spread + pow(max(lf_base.alpha, 1e-30), 1.34);
     width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
     V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    lobes = D * V + q * lobes;
-    vec3 base = throughput * directional * F2 * lobes;
-    return lit ? f + base : vec3(0.0);
+    lobe = D * V;
+    lobes = lobe + q * lobes;
+    vec3 f2 = f + throughput * directional * F2 * lobes;
+    return lit ? f2 : vec3(0.0);
 }
 
 // BRDF [1/sr] in any frame.

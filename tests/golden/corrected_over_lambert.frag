@@ -173,8 +173,8 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float added = i.lengthening + o.lengthening;
     vec3 diffuse = lf_transmittance(lf_coat.tau, straight + added);
     vec3 reflected = lf_base.albedo / 3.1415927 * lf_base_returned;
-    vec3 base = throughput * diffuse * reflected;
-    return lit ? f + base : vec3(0.0);
+    vec3 f2 = f + throughput * diffuse * reflected;
+    return lit ? f2 : vec3(0.0);
 }
 
 // BRDF [1/sr] in any frame.

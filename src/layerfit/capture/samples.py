@@ -86,11 +86,11 @@ class View:
 
     def check(self, stack: Stack) -> None:
         """Raise `InputError` for a material that cannot be drawn here: one with a grain, where nothing says which way it runs."""
-        grain = [layer.name for layer in (*stack.layers, stack.base) if getattr(layer, "alpha_x", None) is not None]
+        grain = [f"{layer.name}.{layer.grain}" for layer in (*stack.layers, stack.base) if layer.grain]
         if grain and self.tangent is None:
             raise InputError(
-                f"{self.reference.exr}: {grain[0]}.alpha_x is measured along a tangent, and there is none. Render a tangent channel, name it "
-                f'with tangent = "..." under [reference], give [geometry] kind = "sphere", or give {grain[0]} one width, alpha'
+                f"{self.reference.exr}: {grain[0]} is measured along a tangent, and there is none. Render a tangent channel, name it "
+                f'with tangent = "..." under [reference], give [geometry] kind = "sphere", or leave {grain[0]} out for an isotropic one'
             )
 
     def scales(self, stack: Stack) -> np.ndarray | None:

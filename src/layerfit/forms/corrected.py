@@ -30,7 +30,7 @@ from ..optics.interface import (
 )
 from ..optics.medium import refract_about_normal, transmittance
 from ..optics.microfacet import Width, half_cosine, half_vector
-from ..surfaces.microfacet import Microfacets
+from ..surfaces.base import Lobe
 
 # Share of the path that a rough interface adds which light of a directional lobe takes: fitted, it lies between none and all.
 DIRECTIONAL_SHARE = 0.5
@@ -77,6 +77,8 @@ class Prepared:
     base: Any
     returned: Colour | None
     """Gain of a diffuse base by light reflected back to it."""
+    lobes: Colour | None
+    """Part of the light that the lobes of a base send back which has a diffuse part too."""
     trapped: Colour | None
     """Diffuse light of a rough base, kept in by total reflection until it leaves [1/sr]."""
 
@@ -112,13 +114,28 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Corrected) -> Prepared:
         n = coat.eta
         interfaces.append(_interface(relative[-1], n, options))
     base = base.below(n)
-    returned = trapped = None
-    if isinstance(base, Microfacets):
-        if options.trapped:
-            trapped = trapped_light(base, relative[-1].tau, n)
-    else:
-        returned = 1.0 / jnp.maximum(1.0 - base.albedo + base.albedo * _escape(relative, interfaces), 1e-6)
-    return Prepared(tuple(relative), tuple(interfaces), base, returned, trapped)
+    returned = lobes = trapped = None
+    if base.diffuse is not None and base.lobes:
+        one = jnp.ones_like(n)
+        lobes = jnp.minimum(sum(lobe.energy(lobe.reflectance(one)) for lobe in base.lobes), 1.0)
+    if base.diffuse is not None:
+        returned = 1.0 / jnp.maximum(_left(base.diffuse.albedo, lobes, relative, interfaces), 1e-6)
+    if base.lobes and options.trapped:
+        trapped = sum(trapped_light(lobe, relative[-1].tau, n) for lobe in base.lobes)
+    return Prepared(tuple(relative), tuple(interfaces), base, returned, lobes, trapped)
+
+
+def _left(albedo: Colour, lobes: Colour | None, coats: list[Coat], interfaces: list[Interface]) -> Colour:
+    """What is left of light between two meetings with the diffuse part, taken from 1: 1 - d 2 int R / (1 - s R) mu dmu.
+
+    d and s are the albedos of the diffuse part and of the lobes, R is what comes back. In between, light meets the lobes as it would
+    a mirror. Written by x = 1 - R, nothing cancels where d + s is near 1, which is also the most that it counts.
+    """
+    escape = _escape(coats, interfaces, lobes)
+    if lobes is None:
+        return 1.0 - albedo + albedo * escape
+    both = jnp.minimum(albedo + lobes, 1.0)
+    return (1.0 - both) / jnp.maximum(1.0 - lobes, 1e-6) * (1.0 - lobes * escape) + both * escape
 
 
 def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Corrected) -> Colour:
@@ -132,14 +149,17 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Corrected) -> Colo
     for coat in prepared.coats[1:]:
         f = f + _bounced(coat, below, options)
         below = _enter(below, wi, wo, prepared, options)
-    if isinstance(prepared.base, Microfacets):
-        base = _bounced(prepared.base, below, options)
-        if prepared.trapped is not None:
-            base = base + below.throughput * below.directional * prepared.trapped
-    else:
-        reflected = prepared.base.evaluate(below.i.w, below.o.w) * prepared.returned
-        base = below.throughput * below.diffuse * reflected
-    return jnp.where(lit, f + base, 0.0)
+    for lobe in prepared.base.lobes:
+        f = f + _bounced(lobe, below, options)
+    if prepared.trapped is not None:
+        f = f + below.throughput * below.directional * prepared.trapped
+    if prepared.returned is not None:
+        reflected = prepared.base.diffuse.evaluate(below.i.w, below.o.w) * prepared.returned
+        if prepared.lobes is not None:
+            reflected = reflected * _by_lobes(prepared.lobes, below.R_i, below.i, below.tau)
+            reflected = reflected * _by_lobes(prepared.lobes, below.R_o, below.o, below.tau)
+        f = f + below.throughput * below.diffuse * reflected
+    return jnp.where(lit, f, 0.0)
 
 
 @struct
@@ -238,26 +258,30 @@ def _reflected_above(T: Scalar, R: Colour, tau: Colour | None, cosine: Scalar) -
     return F + T * T * back / jnp.maximum(1.0 - F * back, 1e-6)
 
 
-def _bounced(target: Microfacets, below: _Below, options: Corrected) -> Colour:
-    """Light of a rough boundary below coats: its first reflection, and the ever wider lobes of light sent back to it."""
+def _bounced(target: Lobe, below: _Below, options: Corrected) -> Colour:
+    """Light of one lobe below coats: its first reflection, and the ever wider lobes of light sent back to it."""
     wi, wo = below.i.w, below.o.w
     if options.steer:
         wi = steer(wi, DIRECTIONAL_SHARE * below.i.drift)
         wo = steer(wo, DIRECTIONAL_SHARE * below.o.drift)
     h = half_vector(wi, wo)
-    F = target.fresnel(half_cosine(wi, wo))
-    q = F * _returned(target, below, options) * below.directional
+    F = target.reflectance(half_cosine(wi, wo))
+    q = target.energy(F) * _returned(target, below, options) * below.directional
     spread = _spread(target, below) if options.broaden else None
     lobes: Any = 0.0
     for order in range(max(options.orders, 1), 0, -1):
         width = target.width if spread is None else _widened(target, order, below, spread)
-        D = target.density(h, width)
-        V = target.visibility(wi, wo, width)
-        lobes = D * V / jnp.maximum(1.0 - q, 1e-6) if order == options.orders else D * V + q * lobes
+        lobe = target.shape(wi, wo, h, width)
+        lobes = lobe / jnp.maximum(1.0 - q, 1e-6) if order == options.orders else lobe + q * lobes
     return below.throughput * below.directional * F * lobes
 
 
-def _returned(target: Microfacets, below: _Below, options: Corrected) -> Colour:
+def _by_lobes(lobes: Colour, R: Colour, crossing: Crossing, tau: Colour | None) -> Colour:
+    """Gain of a diffuse part by light of one direction that the lobes send to the coat first, and the coat back."""
+    return 1.0 / jnp.maximum(1.0 - lobes * R * _absorbed(tau, safe_divide(2.0, crossing.w[2])), 1e-6)
+
+
+def _returned(target: Lobe, below: _Below, options: Corrected) -> Colour:
     """Part of the light leaving `target` that comes back to it."""
     R = 0.5 * (below.R_i + below.R_o)
     if not options.edge:
@@ -286,7 +310,7 @@ def _component(width: Width, axis: int) -> Scalar:
     return width[axis] if isinstance(width, tuple) else width
 
 
-def _spread(target: Microfacets, below: _Below) -> Width:
+def _spread(target: Lobe, below: _Below) -> Width:
     """What the interfaces passed add to the width of every lobe, to the power in which widths add."""
     p = WIDTH_POWER[target.distribution]
 
@@ -299,7 +323,7 @@ def _spread(target: Microfacets, below: _Below) -> Width:
     return _per_axis([target.width, *(width for width, _, _ in below.spreads)], along)
 
 
-def _widened(target: Microfacets, order: int, below: _Below, spread: Width) -> Width:
+def _widened(target: Lobe, order: int, below: _Below, spread: Width) -> Width:
     """Width of the lobe of light that met `target` `order` times, and the interface above it in between."""
     p = WIDTH_POWER[target.distribution]
 
@@ -317,15 +341,15 @@ def _power(x: Scalar, p: float) -> Scalar:
     return x * x if p == 2.0 else safe_power(x, p)
 
 
-def trapped_light(base: Microfacets, tau: Colour | None, n: Scalar) -> Colour:
+def trapped_light(lobe: Lobe, tau: Colour | None, n: Scalar) -> Colour:
     """Radiance factor [1/sr] of light kept below the coat by total reflection until a rough base frees it."""
-    alpha = jnp.minimum(_mean_width(base.width), 1.0)
+    alpha = jnp.minimum(_mean_width(lobe.width), 1.0)
     a2 = alpha * alpha
     scattered = 0.95 * (1.0 - 0.6 * alpha) * a2 / (a2 + 0.03)
     lost = 1.55 * a2 / (1.0 + 1.3 * a2)
     critical = safe_sqrt((1.0 - 1.0 / n) * (1.0 + 1.0 / n))
     t = _absorbed(tau, safe_divide(3.0, critical))
-    F0 = base.f0
+    F0 = lobe.energy(lobe.reflectance(jnp.ones_like(n)))
     kept = jnp.maximum(0.0, 1.0 - lost - scattered / (n * n))
     freed = F0 * F0 * scattered * scattered * (critical * critical) * t / jnp.pi
     return jnp.where(critical > 1e-4, freed / jnp.maximum(1.0 - F0 * kept * t, 1e-6), 0.0)
@@ -338,8 +362,11 @@ def _nodes(dtype: np.dtype) -> tuple[np.ndarray, np.ndarray]:
 
 
 @jax.jit  # not for speed: outside of a trace, a scan over a new function would compile again at every call
-def _escape(coats: list[Coat], interfaces: list[Interface]) -> Colour:
-    """Part of the light of a diffuse base that gets out at its first try: 2 int (1 - R exp(-2 tau / mu)) mu dmu."""
+def _escape(coats: list[Coat], interfaces: list[Interface], lobes: Colour | None = None) -> Colour:
+    """Part of the light of a diffuse base that gets out at its first try: 2 int x mu dmu, x = 1 - R exp(-2 tau / mu).
+
+    Of a base with lobes of albedo s too, 2 int x / (1 - s + s x) mu dmu.
+    """
     n = interfaces[-1].n
     n_above = interfaces[-2].n if len(interfaces) > 1 else jnp.ones_like(n)
     # Directions are counted by their cosine u^3 in the rarer of the two media: there the integrand is smooth, at any
@@ -347,6 +374,9 @@ def _escape(coats: list[Coat], interfaces: list[Interface]) -> Colour:
     rare = jnp.minimum(n, n_above)
     cone = (rare / n) ** 2
     tau = coats[-1].tau
+
+    def tries(x: Any) -> Any:
+        return x if lobes is None else x / jnp.maximum(1.0 - lobes + lobes * x, 1e-6)
 
     def add(total: Colour, node: tuple[Scalar, Scalar]) -> tuple[Colour, None]:
         u, weight = node
@@ -357,11 +387,11 @@ def _escape(coats: list[Coat], interfaces: list[Interface]) -> Colour:
         S = _passed_up(coats, interfaces, p2)
         cosine = safe_sqrt((rare * u3) ** 2 + (n - rare) * (n + rare)) / n
         outside = u3 * safe_sqrt(1.0 - cone)
-        total = total + jacobian * cone * (S + (1.0 - S) * _lost(tau, cosine))
-        return total + jacobian * (1.0 - cone) * _lost(tau, outside), None
+        total = total + jacobian * cone * tries(S + (1.0 - S) * _lost(tau, cosine))
+        return total + jacobian * (1.0 - cone) * tries(_lost(tau, outside)), None
 
     u, weight = _nodes(n.dtype)
-    zero = jnp.zeros_like(n if tau is None else tau)
+    zero = jnp.zeros(jnp.broadcast_shapes(*(jnp.shape(x) for x in (n, tau, lobes) if x is not None)), n.dtype)
     return jax.lax.scan(add, zero, (jnp.asarray(u), jnp.asarray(weight)))[0]
 
 

@@ -66,7 +66,7 @@ def _evaluate(coats: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, options: F
 def _coat_over(coat: Coat, below: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, options: Faithful) -> Colour:
     h = half_vector(wi, wo)
     c = half_cosine(wi, wo)
-    F = coat.fresnel(c)
+    F = coat.reflectance(c)
     D = coat.density(h)
     V = coat.visibility(wi, wo)
     top = F * D * V

@@ -82,7 +82,7 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
     if isinstance(base, (Lambert, OrenNayar)):
         return None
     if not isinstance(base, Conductor):
-        return f"its base is no {type(base).__name__.lower()}"
+        return f"{base.name} is neither lambert nor oren_nayar nor conductor, the bases that it was made for"
     if base.alpha is None or base.distribution != "ggx":
         return f"{base.name} is not isotropic GGX"
     return None
@@ -151,7 +151,7 @@ def below(i: Crossing, o: Crossing, coat: Coat, base: Any, returned: Colour) -> 
         part = direct(share, *DIRECT_PATH)
         path = between(y, x, part)
         U = U * (path if coat.tau is None else projected(path, part * x.theta, coat.tau))
-    F = base.fresnel(half_cosine(yi, yo))
+    F = base.reflectance(half_cosine(yi, yo))
     # Where the indices match there is no interface, and nothing of what it does.
     rise = 1.0 + RISE * presence(coat.eta) * coat.alpha * coat.alpha * share
     first = rise * lobe(i, o, yi, yo, base.alpha, base.alpha)

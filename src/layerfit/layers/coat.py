@@ -54,7 +54,7 @@ class Coat(Microfacets):
         """The same coat under a medium of index `n`: relative index, medium by its optical depth alone."""
         return replace(self, eta=self.eta / n, tau=self.optical_depth, absorption_per_mm=None, thickness_um=None)
 
-    def fresnel(self, c: Scalar) -> Scalar:
+    def reflectance(self, c: Scalar) -> Scalar:
         return fresnel_dielectric(c, self.eta)
 
     def transmittance(self, c: Scalar) -> Scalar:

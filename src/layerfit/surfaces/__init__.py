@@ -1,7 +1,20 @@
 """One boundary each: what reflects light at the bottom of a stack, or on its own."""
 
+from .cosine import Blinn as Blinn, Phong as Phong
 from .diffuse import Lambert as Lambert, OrenNayar as OrenNayar
+from .grooves import CookTorrance as CookTorrance, TorranceSparrow as TorranceSparrow
+from .lafortune import Lafortune as Lafortune
 from .microfacet import Conductor as Conductor, Dielectric as Dielectric
 
-BASES = {"conductor": Conductor, "dielectric": Dielectric, "lambert": Lambert, "oren_nayar": OrenNayar}
+BASES = {
+    "conductor": Conductor,
+    "dielectric": Dielectric,
+    "lambert": Lambert,
+    "oren_nayar": OrenNayar,
+    "phong": Phong,
+    "blinn": Blinn,
+    "lafortune": Lafortune,
+    "torrance_sparrow": TorranceSparrow,
+    "cook_torrance": CookTorrance,
+}
 """The surfaces by their name in a preset."""

@@ -1,12 +1,23 @@
 """Diffuse boundaries: light that has lost its direction below the surface."""
 
-from typing import Any, Self
+from typing import Any
 
 import jax.numpy as jnp
 
 from .._chunk import chunk, safe_divide, safe_sqrt, static
 from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar, Vec3
+from .base import Surface
+
+
+class Diffuse(Surface):
+    """A boundary without lobes: it is its own diffuse part."""
+
+    albedo: Number
+
+    @property
+    def diffuse(self) -> Any:
+        return self
 
 
 def _albedo() -> Any:
@@ -14,15 +25,11 @@ def _albedo() -> Any:
 
 
 @layer
-class Lambert:
+class Lambert(Diffuse):
     """An ideally diffuse boundary: the same radiance in every direction (Lambert 1760)."""
 
     name: str = static(default="base", doc="name of the layer")
     albedo: Number = _albedo()
-
-    def below(self, n: Scalar) -> Self:
-        """The same boundary: a medium above does not change it."""
-        return self
 
     def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
         """BRDF [1/sr]."""
@@ -75,7 +82,7 @@ def oren_nayar_full(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour
 
 
 @layer
-class OrenNayar:
+class OrenNayar(Diffuse):
     """A rough diffuse boundary: V-grooves of Lambertian facets (Oren and Nayar 1994)."""
 
     name: str = static(default="base", doc="name of the layer")
@@ -84,10 +91,6 @@ class OrenNayar:
         default=0.3, lower=0.0, upper=1.2, scale="softlog", doc="standard deviation of the facet angle", unit="rad", soft=0.1
     )
     form: str = choice(default="full", others=("qualitative",), doc="with one interreflection, or the short form")
-
-    def below(self, n: Scalar) -> Self:
-        """The same boundary: a medium above does not change it."""
-        return self
 
     def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
         """BRDF [1/sr]."""

@@ -8,9 +8,10 @@ from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from ..optics.fresnel import conductor_f0, dielectric_f0, fresnel_conductor, fresnel_dielectric
 from ..optics.microfacet import Distribution, Masking, Width, density, half_cosine, half_vector, visibility
+from .base import Lobe, Surface
 
 
-class Microfacets:
+class Microfacets(Surface, Lobe):
     """A boundary whose facets have a width: one `alpha`, or `alpha_x` along the tangent and `alpha_y` across it."""
 
     alpha: Number
@@ -23,14 +24,13 @@ class Microfacets:
     def width(self) -> Width:
         return self.alpha if self.alpha_x is None else (self.alpha_x, self.alpha_y)
 
-    def fresnel(self, c: Scalar) -> Colour:
-        """Reflectance of one facet at the cosine `c`."""
-        raise NotImplementedError
+    @property
+    def grain(self) -> str | None:
+        return None if self.alpha_x is None else "alpha_x"
 
     @property
-    def f0(self) -> Colour:
-        """Reflectance of one facet at normal incidence."""
-        raise NotImplementedError
+    def lobes(self) -> tuple[Lobe, ...]:
+        return (self,)
 
     def density(self, h: Vec3, width: Width | None = None) -> Scalar:
         """D(h) [1/sr] of these facets, or of wider ones."""
@@ -40,9 +40,15 @@ class Microfacets:
         """G / (4 NoL NoV) of these facets, or of wider ones."""
         return visibility(self.masking, self.distribution, wi, wo, self.width if width is None else width)
 
+    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+        """D V."""
+        D = self.density(h, width)
+        V = self.visibility(wi, wo, width)
+        return D * V
+
     def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
-        """BRDF [1/sr] of directions above the surface (Cook and Torrance 1982; Walter et al. 2007, eq. 20)."""
-        F = self.fresnel(half_cosine(wi, wo))
+        """F D V [1/sr] of directions above the surface (Cook and Torrance 1982; Walter et al. 2007, eq. 20)."""
+        F = self.reflectance(half_cosine(wi, wo))
         D = self.density(half_vector(wi, wo))
         V = self.visibility(wi, wo)
         return F * D * V
@@ -54,42 +60,51 @@ def alpha_param(*, default: float | None, which: str) -> Any:
     return param(default=default, lower=1e-3, upper=1.0, scale="log", doc=doc)
 
 
-@layer
-class Conductor(Microfacets):
-    """A metal: complex index of refraction, rough.
+def metal_eta() -> Any:
+    """Declare the index of a metal."""
+    doc = "index of refraction, real part"
+    return param(default=0.2, lower=0.02, upper=10.0, scale="log", doc=doc, colour=True, fitted=False)
 
-    `eta` and `k` are absolute (against air); a coat above divides them by its own index.
-    """
+
+def metal_k() -> Any:
+    """Declare the extinction of a metal."""
+    doc = "index of refraction, imaginary part"
+    return param(default=3.5, lower=0.0, upper=15.0, scale="softlog", doc=doc, colour=True, fitted=False)
+
+
+class Metal(Surface):
+    """A boundary to a complex index of refraction, absolute (against air); a coat above divides it by its own."""
+
+    eta: Number
+    k: Number
+
+    def below(self, n: Scalar) -> Self:
+        """The same metal under a medium of index `n`."""
+        made: Any = self
+        return replace(made, eta=self.eta / n, k=self.k / n)
+
+    def reflectance(self, c: Scalar) -> Colour:
+        """Of one facet."""
+        return fresnel_conductor(c, self.eta, self.k)
+
+    @property
+    def f0(self) -> Colour:
+        """Reflectance of one facet at normal incidence."""
+        return conductor_f0(self.eta, self.k)
+
+
+@layer
+class Conductor(Metal, Microfacets):
+    """A rough metal."""
 
     name: str = static(default="base", doc="name of the layer")
     alpha: Number = alpha_param(default=0.2, which="")
     alpha_x: Number = alpha_param(default=None, which=" along the tangent")
     alpha_y: Number = alpha_param(default=None, which=" across the tangent")
-    eta: Number = param(
-        default=0.2, lower=0.02, upper=10.0, scale="log", doc="index of refraction, real part", colour=True, fitted=False
-    )
-    k: Number = param(
-        default=3.5,
-        lower=0.0,
-        upper=15.0,
-        scale="softlog",
-        doc="index of refraction, imaginary part",
-        colour=True,
-        fitted=False,
-    )
+    eta: Number = metal_eta()
+    k: Number = metal_k()
     distribution: Distribution = choice(default="ggx", others=("beckmann",), doc="density of the facet normals")
     masking: Masking = choice(default="smith", others=("smith_separable", "vcavity"), doc="how facets hide one another")
-
-    def below(self, n: Scalar) -> Self:
-        """The same metal under a medium of index `n`."""
-        return replace(self, eta=self.eta / n, k=self.k / n)
-
-    def fresnel(self, c: Scalar) -> Colour:
-        return fresnel_conductor(c, self.eta, self.k)
-
-    @property
-    def f0(self) -> Colour:
-        return conductor_f0(self.eta, self.k)
 
 
 @layer
@@ -108,7 +123,7 @@ class Dielectric(Microfacets):
         """The same medium under one of index `n`."""
         return replace(self, eta=self.eta / n)
 
-    def fresnel(self, c: Scalar) -> Colour:
+    def reflectance(self, c: Scalar) -> Colour:
         return fresnel_dielectric(c, self.eta)
 
     @property

@@ -10,7 +10,7 @@ from .._chunk import static, struct
 from .._types import Number, Scalar
 from ..optics.microfacet import Distribution
 from ..stack import Stack
-from ..surfaces.microfacet import Microfacets
+from ..surfaces.microfacet import Conductor, Dielectric, Microfacets
 from ._facets import Widths
 
 Interface = Literal["single", "multi"]
@@ -104,6 +104,11 @@ def check(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
             raise ValueError(f"coat {coat.name!r} has V-cavities, which say nothing of refracted light: set masking='smith'")
         if np.ndim(coat.eta) > 1:
             raise ValueError(f"coat {coat.name!r} has an index for every channel; a path has one direction: walk by channel")
+    if not (stack.base.diffuse is stack.base or isinstance(stack.base, (Conductor, Dielectric))):
+        kind = type(stack.base).__name__
+        raise ValueError(
+            f"base {stack.base.name!r}: a {kind} is a formula, no facets to walk on; use a conductor or a diffuse base"
+        )
     if np.any(stack.layers[0].eta == 1.0):
         raise ValueError(
             "the top coat has the index of air, so no interface: leave it out, multiply by exp(-tau (1/NoL + 1/NoV))"

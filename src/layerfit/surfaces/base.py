@@ -1,0 +1,77 @@
+"""What a form asks of a boundary: its diffuse part, and its lobes.
+
+A form never asks what class a boundary is. Light that keeps its direction below a coat meets the lobes, which rough coats widen; light
+that has lost it meets the diffuse part.
+"""
+
+from collections.abc import Collection
+from typing import Any, Self
+
+from .._types import Colour, Number, Scalar, Vec3
+from ..optics.microfacet import Distribution, Width, half_cosine, half_vector
+
+
+def variance(width: Width) -> Scalar:
+    """alpha^2; of two widths that of their mean, for an isotropic lobe below a coat that has two."""
+    return width[0] * width[1] if isinstance(width, tuple) else width * width
+
+
+class Lobe:
+    """Light that is sent back about a direction: f = reflectance(c) shape(wi, wo, h)."""
+
+    distribution: Distribution = "beckmann"
+    """How widths add: those of Gaussian lobes by their squares."""
+
+    @property
+    def width(self) -> Width:
+        """Width of the facets that would make such a lobe."""
+        raise NotImplementedError
+
+    def reflectance(self, c: Scalar) -> Colour:
+        """What the lobe takes its colour from, at the half cosine `c`."""
+        raise NotImplementedError
+
+    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Any:
+        """The rest [1/sr], of this lobe or of one widened to `width`; `h` is the half vector."""
+        raise NotImplementedError
+
+    def energy(self, reflectance: Colour) -> Colour:
+        """Part of the light that the lobe sends back, 0 to 1, by its `reflectance`: it scales what goes to and fro below a coat."""
+        return reflectance
+
+
+class Surface:
+    """A boundary: a diffuse part, lobes, or both. Each may be absent."""
+
+    @property
+    def diffuse(self) -> Any:
+        """A diffuse boundary with an `albedo`, or None."""
+        return None
+
+    @property
+    def lobes(self) -> tuple[Lobe, ...]:
+        """The lobes; none on a diffuse boundary."""
+        return ()
+
+    @property
+    def grain(self) -> str | None:
+        """The field that is measured along the tangent, so that the surface needs one; None where it is isotropic."""
+        return None
+
+    @classmethod
+    def incomplete(cls, given: Collection[str]) -> str | None:
+        """What is wrong with a preset that gives these fields of it, where some of them need others; None if nothing is."""
+        return None
+
+    def below(self, n: Scalar) -> Self:
+        """The same boundary under a medium of index `n`: what has no index does not change."""
+        return self
+
+    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+        """BRDF [1/sr] of directions above the surface."""
+        h = half_vector(wi, wo)
+        c = half_cosine(wi, wo)
+        parts: list[Number] = [lobe.reflectance(c) * lobe.shape(wi, wo, h) for lobe in self.lobes]
+        if self.diffuse is not None:
+            parts.append(self.diffuse.evaluate(wi, wo))
+        return sum(parts[1:], parts[0])

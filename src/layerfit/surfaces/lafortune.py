@@ -1,0 +1,134 @@
+"""Generalised cosine lobes: Lafortune, Foo, Torrance and Greenberg 1997."""
+
+import dataclasses
+import math
+from collections.abc import Collection
+from typing import Any
+
+import jax.numpy as jnp
+
+from .._chunk import chunk, safe_sqrt, static
+from .._fields import layer, param
+from .._types import Colour, Number, Scalar, Vec3
+from ..optics.microfacet import Width
+from .base import Lobe, Surface, variance
+from .diffuse import Lambert
+
+
+@chunk
+def lafortune_log_product(wi: Vec3, wo: Vec3, C: Vec3) -> Scalar:
+    """log(Cx wi.x wo.x + Cy wi.y wo.y + Cz wi.z wo.z), which is 0 at the peak of Phong's lobe; -1e4 where there is none."""
+    # a b = (a^2 + b^2 - (a - b)^2) / 2, with signs, and unit vectors: the sum less 1 has its own digits near 0.
+    magnitude = jnp.abs(C)
+    apart = wi - jnp.sign(C) * wo
+    above_one = 0.5 * ((magnitude - 1.0) * (wi * wi + wo * wo) - magnitude * (apart * apart))
+    product = above_one[0] + above_one[1] + above_one[2]
+    inside = product > -0.999999
+    return jnp.where(inside, jnp.log1p(jnp.where(inside, product, 0.0)), -1e4)
+
+
+@chunk
+def lafortune_log_length(w: Vec3, C: Vec3) -> Scalar:
+    """log of the length of (Cx w.x, Cy w.y, Cz w.z): the most that any direction makes of the product with w."""
+    x, y, z = C[0] * w[0], C[1] * w[1], C[2] * w[2]
+    return 0.5 * jnp.log(jnp.maximum(x * x + y * y + z * z, 1e-12))
+
+
+@dataclasses.dataclass(frozen=True)
+class LafortuneLobe(Lobe):
+    """One lobe of several."""
+
+    ks: Colour
+    C: Vec3
+    exponent: Scalar
+
+    @property
+    def width(self) -> Width:
+        """As Phong's."""
+        return safe_sqrt(0.5 / self.exponent)
+
+    def reflectance(self, c: Scalar) -> Colour:
+        return self.ks
+
+    def energy(self, reflectance: Colour) -> Colour:
+        """At normal incidence, where the lobe is |Cz|^n cos^n."""
+        peak = jnp.exp(jnp.minimum(self.exponent * jnp.log(jnp.maximum(jnp.abs(self.C[2]), 1e-6)), 20.0))
+        return jnp.minimum(reflectance * peak * (2.0 * math.pi / (self.exponent + 2.0)), 1.0)
+
+    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+        """The power of the product; of a widened lobe, a lower power with the same light and the same scale."""
+        log_product = lafortune_log_product(wi, wo, self.C)
+        if width is None:
+            return _power(log_product, self.exponent)
+        exponent = 0.5 / variance(width)
+        log_scale = 0.5 * (lafortune_log_length(wi, self.C) + lafortune_log_length(wo, self.C))
+        same_light = (exponent + 2.0) / (self.exponent + 2.0)
+        return same_light * _power(log_product - log_scale, exponent) * _power(log_scale, self.exponent)
+
+
+def _power(log_base: Scalar, exponent: Scalar) -> Scalar:
+    return jnp.exp(jnp.minimum(exponent * log_base, 80.0))
+
+
+def _ks(default: float | None) -> Any:
+    return param(default=default, lower=0.0, upper=1e3, scale="softlog", doc="strength of the lobe", unit="1/sr", colour=True)
+
+
+def _c(default: float | None, axis: str, fitted: bool = True) -> Any:
+    return param(default=default, lower=-2.0, upper=2.0, scale="linear", doc=f"weight of the product of {axis}", fitted=fitted)
+
+
+def _exponent(default: float | None) -> Any:
+    return param(default=default, lower=0.5, upper=1e4, scale="log", doc="exponent of the lobe; large is narrow")
+
+
+@layer
+class Lafortune(Surface):
+    """Up to three lobes ks (Cx wi.x wo.x + Cy wi.y wo.y + Cz wi.z wo.z)^n beside a diffuse part (Lafortune et al. 1997).
+
+    Without `cy` a lobe is isotropic, Cy = Cx. Cx = Cy = -1 and Cz = 1 is Phong's; -Cx > Cz stands up off-specular peaks. The scale of
+    the three and `ks` are one number: a fit holds `cz`. A second and third lobe are there where all of their fields are.
+    """
+
+    name: str = static(default="base", doc="name of the layer")
+    kd: Number = param(default=None, lower=0.0, upper=1.0, scale="linear", doc="diffuse part", colour=True)
+    ks: Number = _ks(0.5)
+    cx: Number = _c(-1.0, "the components along the tangent")
+    cy: Number = _c(None, "the components across the tangent; absent: as cx")
+    cz: Number = _c(1.0, "the cosines", fitted=False)
+    exponent: Number = _exponent(20.0)
+    ks_2: Number = _ks(None)
+    cx_2: Number = _c(None, "the components along the tangent")
+    cy_2: Number = _c(None, "the components across the tangent; absent: as cx_2")
+    cz_2: Number = _c(None, "the cosines", fitted=False)
+    exponent_2: Number = _exponent(None)
+    ks_3: Number = _ks(None)
+    cx_3: Number = _c(None, "the components along the tangent")
+    cy_3: Number = _c(None, "the components across the tangent; absent: as cx_3")
+    cz_3: Number = _c(None, "the cosines", fitted=False)
+    exponent_3: Number = _exponent(None)
+
+    @property
+    def diffuse(self) -> Any:
+        return None if self.kd is None else Lambert(albedo=self.kd)
+
+    @property
+    def lobes(self) -> tuple[Lobe, ...]:
+        return tuple(self._lobe(suffix) for suffix in ("", "_2", "_3") if getattr(self, f"ks{suffix}") is not None)
+
+    @property
+    def grain(self) -> str | None:
+        return next((name for name in ("cy", "cy_2", "cy_3") if getattr(self, name) is not None), None)
+
+    @classmethod
+    def incomplete(cls, given: Collection[str]) -> str | None:
+        for suffix in ("_2", "_3"):
+            needed = [f"{name}{suffix}" for name in ("ks", "cx", "cz", "exponent")]
+            missing = [name for name in needed if name not in given]
+            if missing and any(name in given for name in (*needed, f"cy{suffix}")):
+                return f"a further lobe has {', '.join(needed)} together; {missing[0]} is missing"
+        return None
+
+    def _lobe(self, suffix: str) -> LafortuneLobe:
+        ks, cx, cy, cz, exponent = (getattr(self, f"{name}{suffix}") for name in ("ks", "cx", "cy", "cz", "exponent"))
+        return LafortuneLobe(ks, jnp.stack([cx, cx if cy is None else cy, cz]), exponent)
