@@ -33,6 +33,16 @@ from .shader.verify import (
     shade_samples as shade_samples,
 )
 from .stack import Stack as Stack
-from .surfaces import Conductor as Conductor, Dielectric as Dielectric, Lambert as Lambert, OrenNayar as OrenNayar
+from .surfaces import (
+    Blinn as Blinn,
+    Conductor as Conductor,
+    CookTorrance as CookTorrance,
+    Dielectric as Dielectric,
+    Lafortune as Lafortune,
+    Lambert as Lambert,
+    OrenNayar as OrenNayar,
+    Phong as Phong,
+    TorranceSparrow as TorranceSparrow,
+)
 
 __version__: str

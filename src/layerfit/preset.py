@@ -102,12 +102,11 @@ def left_out(stack: Stack) -> list[str]:
     for layer in stack.layers:
         if hasattr(layer, "optical_depth") and layer.optical_depth is None:
             words.append(f"{layer.name}: absorption")
+    for layer in (*stack.layers, stack.base):
         words += [f"{layer.name}: {lack}" for lack in getattr(layer, "lacks", ())]
     for layer in (*stack.layers, stack.base):
         if hasattr(layer, "alpha_x") and layer.alpha is not None:
             words.append(f"{layer.name}: anisotropy")
-    if getattr(stack.base, "kd", 0.0) is None:
-        words.append(f"{stack.base.name}: diffuse part")
     return words
 
 
@@ -191,6 +190,9 @@ def _layer(document: Any, kinds: Mapping[str, Any], where: str) -> Any:
     for group in getattr(cls, "together", ()):
         if missing := [key for key in group if key not in values] if any(key in values for key in group) else []:
             raise InputError(f"{where}: {', '.join(group)} come together; {', '.join(missing)} is missing")
+    for key, other in getattr(cls, "only_with", {}).items():
+        if key in values and other not in values:
+            raise InputError(f"{where}: {key} belongs to {other}, which is not there: leave it out or give both")
     return cls(**values)
 
 

@@ -8,6 +8,8 @@ back down makes a series of ever wider lobes. Holds for any number of coats; wit
 
 import dataclasses
 from collections.abc import Callable
+from functools import reduce
+from operator import add
 from typing import Any
 
 import jax
@@ -117,11 +119,11 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Corrected) -> Prepared:
     returned = lobes = trapped = None
     if base.diffuse is not None and base.lobes:
         one = jnp.ones_like(n)
-        lobes = jnp.minimum(sum(lobe.energy(lobe.reflectance(one)) for lobe in base.lobes), 1.0)
+        lobes = jnp.minimum(reduce(add, (lobe.energy(lobe.reflectance(one)) for lobe in base.lobes)), 1.0)
     if base.diffuse is not None:
         returned = 1.0 / jnp.maximum(_left(base.diffuse.albedo, lobes, relative, interfaces), 1e-6)
     if base.lobes and options.trapped:
-        trapped = sum(trapped_light(lobe, relative[-1].tau, n) for lobe in base.lobes)
+        trapped = reduce(add, (trapped_light(lobe, relative[-1].tau, n) for lobe in base.lobes))
     return Prepared(tuple(relative), tuple(interfaces), base, returned, lobes, trapped)
 
 
@@ -378,7 +380,7 @@ def _escape(coats: list[Coat], interfaces: list[Interface], lobes: Colour | None
     def tries(x: Any) -> Any:
         return x if lobes is None else x / jnp.maximum(1.0 - lobes + lobes * x, 1e-6)
 
-    def add(total: Colour, node: tuple[Scalar, Scalar]) -> tuple[Colour, None]:
+    def accumulate(total: Colour, node: tuple[Scalar, Scalar]) -> tuple[Colour, None]:
         u, weight = node
         u2 = u * u
         u3 = u2 * u
@@ -392,7 +394,7 @@ def _escape(coats: list[Coat], interfaces: list[Interface], lobes: Colour | None
 
     u, weight = _nodes(n.dtype)
     zero = jnp.zeros(jnp.broadcast_shapes(*(jnp.shape(x) for x in (n, tau, lobes) if x is not None)), n.dtype)
-    return jax.lax.scan(add, zero, (jnp.asarray(u), jnp.asarray(weight)))[0]
+    return jax.lax.scan(accumulate, zero, (jnp.asarray(u), jnp.asarray(weight)))[0]
 
 
 def _lost(tau: Colour | None, cosine: Scalar) -> Any:

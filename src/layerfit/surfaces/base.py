@@ -4,10 +4,11 @@ A form never asks what class a boundary is. Light that keeps its direction below
 that has lost it meets the diffuse part.
 """
 
-from collections.abc import Collection
+from functools import reduce
+from operator import add
 from typing import Any, Self
 
-from .._types import Colour, Number, Scalar, Vec3
+from .._types import Colour, Scalar, Vec3
 from ..optics.microfacet import Distribution, Width, half_cosine, half_vector
 
 
@@ -58,11 +59,6 @@ class Surface:
         """The field that is measured along the tangent, so that the surface needs one; None where it is isotropic."""
         return None
 
-    @classmethod
-    def incomplete(cls, given: Collection[str]) -> str | None:
-        """What is wrong with a preset that gives these fields of it, where some of them need others; None if nothing is."""
-        return None
-
     def below(self, n: Scalar) -> Self:
         """The same boundary under a medium of index `n`: what has no index does not change."""
         return self
@@ -71,7 +67,7 @@ class Surface:
         """BRDF [1/sr] of directions above the surface."""
         h = half_vector(wi, wo)
         c = half_cosine(wi, wo)
-        parts: list[Number] = [lobe.reflectance(c) * lobe.shape(wi, wo, h) for lobe in self.lobes]
+        parts: list[Any] = [lobe.reflectance(c) * lobe.shape(wi, wo, h) for lobe in self.lobes]
         if self.diffuse is not None:
             parts.append(self.diffuse.evaluate(wi, wo))
-        return sum(parts[1:], parts[0])
+        return reduce(add, parts)

@@ -14,8 +14,8 @@ from .._chunk import chunk, safe_divide, safe_sqrt, static
 from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from ..optics.microfacet import Width
-from .base import Lobe, Surface, variance
-from .diffuse import Lambert
+from .base import Lobe, variance
+from .diffuse import Lambert, TwoParts, kd_param
 
 Scaling = Literal["normalized", "faithful"]
 
@@ -40,19 +40,18 @@ def normal_distance(h: Vec3) -> Scalar:
     return (h[0] * h[0] + h[1] * h[1]) / (1.0 + h[2])
 
 
-class CosineLobe(Surface, Lobe):
+class CosineLobe(TwoParts, Lobe):
     """A Lambertian part and a lobe that is a power of a cosine."""
 
-    kd: Number
     ks: Number
     exponent: Number
     scaling: Scaling
 
     @property
     def diffuse(self) -> Any:
-        if self.kd is None:
-            return None
-        return Lambert(albedo=self.kd if self.scaling == "normalized" else jnp.pi * self.kd)
+        if self.kd is None or self.scaling == "normalized":
+            return super().diffuse
+        return Lambert(albedo=jnp.pi * self.kd)
 
     @property
     def lobes(self) -> tuple[Lobe, ...]:
@@ -81,10 +80,6 @@ class CosineLobe(Surface, Lobe):
         return safe_divide(power, wi[2])
 
 
-def _kd() -> Any:
-    return param(default=None, lower=0.0, upper=1.0, scale="linear", doc="diffuse part", colour=True)
-
-
 def _ks() -> Any:
     return param(default=0.2, lower=0.0, upper=1.0, scale="linear", doc="strength of the lobe", colour=True)
 
@@ -102,7 +97,7 @@ class Phong(CosineLobe):
     """A power of the cosine to the mirror direction (Phong 1975), beside a diffuse part."""
 
     name: str = static(default="base", doc="name of the layer")
-    kd: Number = _kd()
+    kd: Number = kd_param()
     ks: Number = _ks()
     exponent: Number = _exponent()
     scaling: Scaling = _scaling()
@@ -126,7 +121,7 @@ class Blinn(CosineLobe):
     """A power of the cosine between half vector and normal (Blinn 1977), beside a diffuse part."""
 
     name: str = static(default="base", doc="name of the layer")
-    kd: Number = _kd()
+    kd: Number = kd_param()
     ks: Number = _ks()
     exponent: Number = _exponent()
     scaling: Scaling = _scaling()

@@ -36,6 +36,26 @@ class Lambert(Diffuse):
         return self.albedo / jnp.pi
 
 
+class TwoParts(Surface):
+    """A Lambertian part `kd`, which may be absent, beside lobes."""
+
+    kd: Number
+
+    @property
+    def diffuse(self) -> Any:
+        return None if self.kd is None else Lambert(albedo=self.kd)
+
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """What it does without, in words."""
+        return ("diffuse part",) if self.kd is None else ()
+
+
+def kd_param() -> Any:
+    """Declare the Lambertian part of a surface that has lobes too."""
+    return param(default=None, lower=0.0, upper=1.0, scale="linear", doc="diffuse part", colour=True)
+
+
 @chunk
 def oren_nayar_qualitative(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour:
     """Oren and Nayar 1994, eq. 30: diffuse grooves, first order."""

@@ -1,7 +1,7 @@
 """Metals of V-shaped grooves, as published: Torrance and Sparrow 1967, Cook and Torrance 1982."""
 
 import math
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import jax.numpy as jnp
 
@@ -10,16 +10,12 @@ from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from ..optics.microfacet import Distribution, Masking, Width, v_cavity
 from .base import Lobe, variance
-from .diffuse import Lambert
+from .diffuse import TwoParts, kd_param
 from .microfacet import Metal, Microfacets, alpha_param, metal_eta, metal_k
 
 
-def _kd() -> Any:
-    return param(default=None, lower=0.0, upper=1.0, scale="linear", doc="diffuse part", colour=True)
-
-
 @layer
-class CookTorrance(Metal, Microfacets):
+class CookTorrance(TwoParts, Metal, Microfacets):
     """Beckmann facets in V-shaped grooves beside a diffuse part: kd / pi + ks F D G / (4 NoL NoV) (Cook and Torrance 1982).
 
     The paper has pi for 4, with which a rough metal sends back more than it gets: `faithful` is that.
@@ -31,7 +27,7 @@ class CookTorrance(Metal, Microfacets):
     alpha_y: ClassVar[None] = None
 
     name: str = static(default="base", doc="name of the layer")
-    kd: Number = _kd()
+    kd: Number = kd_param()
     ks: Number = param(default=1.0, lower=0.0, upper=1.0, scale="linear", doc="part of the surface that is facets", colour=True)
     alpha: Number = alpha_param(default=0.2, which=", the paper's m")
     eta: Number = metal_eta()
@@ -39,10 +35,6 @@ class CookTorrance(Metal, Microfacets):
     scaling: Literal["normalized", "faithful"] = choice(
         default="normalized", others=("faithful",), doc="divided by 4, or by pi as published"
     )
-
-    @property
-    def diffuse(self) -> Any:
-        return None if self.kd is None else Lambert(albedo=self.kd)
 
     def reflectance(self, c: Scalar) -> Colour:
         F = self.ks * super().reflectance(c)
@@ -65,22 +57,18 @@ def torrance_sparrow_d(h: Vec3, kappa: Scalar) -> Scalar:
 
 
 @layer
-class TorranceSparrow(Metal, Lobe):
+class TorranceSparrow(TwoParts, Metal, Lobe):
     """Facets with a Gaussian of angles in V-shaped grooves beside a diffuse part (Torrance and Sparrow 1967).
 
     f = kd / pi + ks F exp(-(kappa delta)^2) G / (4 NoL NoV). The lobe is not normalised: ks = kappa^2 / pi is about that of all facets.
     """
 
     name: str = static(default="base", doc="name of the layer")
-    kd: Number = _kd()
+    kd: Number = kd_param()
     ks: Number = param(default=15.0, lower=0.0, upper=1e5, scale="softlog", doc="strength of the lobe", colour=True)
     kappa: Number = param(default=7.0, lower=0.5, upper=1e3, scale="log", doc="narrowness of the facet angles", unit="1/rad")
     eta: Number = metal_eta()
     k: Number = metal_k()
-
-    @property
-    def diffuse(self) -> Any:
-        return None if self.kd is None else Lambert(albedo=self.kd)
 
     @property
     def lobes(self) -> tuple[Lobe, ...]:

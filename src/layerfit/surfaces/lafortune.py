@@ -2,8 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Collection
-from typing import Any
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 
@@ -11,8 +10,8 @@ from .._chunk import chunk, safe_sqrt, static
 from .._fields import layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from ..optics.microfacet import Width
-from .base import Lobe, Surface, variance
-from .diffuse import Lambert
+from .base import Lobe, variance
+from .diffuse import TwoParts, kd_param
 
 
 @chunk
@@ -83,15 +82,18 @@ def _exponent(default: float | None) -> Any:
 
 
 @layer
-class Lafortune(Surface):
+class Lafortune(TwoParts):
     """Up to three lobes ks (Cx wi.x wo.x + Cy wi.y wo.y + Cz wi.z wo.z)^n beside a diffuse part (Lafortune et al. 1997).
 
     Without `cy` a lobe is isotropic, Cy = Cx. Cx = Cy = -1 and Cz = 1 is Phong's; -Cx > Cz stands up off-specular peaks. The scale of
     the three and `ks` are one number: a fit holds `cz`. A second and third lobe are there where all of their fields are.
     """
 
+    together: ClassVar = (("ks_2", "cx_2", "cz_2", "exponent_2"), ("ks_3", "cx_3", "cz_3", "exponent_3"))
+    only_with: ClassVar = {"cy_2": "ks_2", "cy_3": "ks_3"}
+
     name: str = static(default="base", doc="name of the layer")
-    kd: Number = param(default=None, lower=0.0, upper=1.0, scale="linear", doc="diffuse part", colour=True)
+    kd: Number = kd_param()
     ks: Number = _ks(0.5)
     cx: Number = _c(-1.0, "the components along the tangent")
     cy: Number = _c(None, "the components across the tangent; absent: as cx")
@@ -109,25 +111,12 @@ class Lafortune(Surface):
     exponent_3: Number = _exponent(None)
 
     @property
-    def diffuse(self) -> Any:
-        return None if self.kd is None else Lambert(albedo=self.kd)
-
-    @property
     def lobes(self) -> tuple[Lobe, ...]:
         return tuple(self._lobe(suffix) for suffix in ("", "_2", "_3") if getattr(self, f"ks{suffix}") is not None)
 
     @property
     def grain(self) -> str | None:
         return next((name for name in ("cy", "cy_2", "cy_3") if getattr(self, name) is not None), None)
-
-    @classmethod
-    def incomplete(cls, given: Collection[str]) -> str | None:
-        for suffix in ("_2", "_3"):
-            needed = [f"{name}{suffix}" for name in ("ks", "cx", "cz", "exponent")]
-            missing = [name for name in needed if name not in given]
-            if missing and any(name in given for name in (*needed, f"cy{suffix}")):
-                return f"a further lobe has {', '.join(needed)} together; {missing[0]} is missing"
-        return None
 
     def _lobe(self, suffix: str) -> LafortuneLobe:
         ks, cx, cy, cz, exponent = (getattr(self, f"{name}{suffix}") for name in ("ks", "cx", "cy", "cz", "exponent"))
