@@ -31,6 +31,15 @@ def reads(*layers: Any) -> tuple[str, ...]:
     return tuple(name for name in INPUTS if name in read)
 
 
+ORIENTED = ("alpha_x", "cy", "cy_2", "cy_3")
+"""Fields that are measured along the tangent or across it: where one is given, a surface has a grain."""
+
+
+def grain(layer: Any) -> str | None:
+    """The field of a layer that gives it a grain, or None where it is isotropic."""
+    return next((name for name in ORIENTED if getattr(layer, name, None) is not None), None)
+
+
 def needs_tangent(layer: Any) -> bool:
     """Whether a layer is laid along a tangent."""
-    return getattr(layer, "grain", None) is not None or TANGENT in getattr(layer, "reads", ())
+    return grain(layer) is not None or TANGENT in getattr(layer, "reads", ())

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .._place import grain
 from ..errors import InputError
 from ..stack import Stack
 from .channels import Channels, resolve
@@ -86,11 +87,11 @@ class View:
 
     def check(self, stack: Stack) -> None:
         """Raise `InputError` for a material that cannot be drawn here: one with a grain, where nothing says which way it runs."""
-        grain = [f"{layer.name}.{layer.grain}" for layer in (*stack.layers, stack.base) if layer.grain]
-        if grain and self.tangent is None:
+        oriented = [f"{layer.name}.{grain(layer)}" for layer in (*stack.layers, stack.base) if grain(layer)]
+        if oriented and self.tangent is None:
             raise InputError(
-                f"{self.reference.exr}: {grain[0]} is measured along a tangent, and there is none. Render a tangent channel, name it "
-                f'with tangent = "..." under [reference], give [geometry] kind = "sphere", or leave {grain[0]} out for an isotropic one'
+                f"{self.reference.exr}: {oriented[0]} is measured along a tangent, and there is none. Render a tangent channel, name it "
+                f'with tangent = "..." under [reference], give [geometry] kind = "sphere", or leave {oriented[0]} out for an isotropic one'
             )
 
     def scales(self, stack: Stack) -> np.ndarray | None:

@@ -54,11 +54,6 @@ class Surface:
         """The lobes; none on a diffuse boundary."""
         return ()
 
-    @property
-    def grain(self) -> str | None:
-        """The field that is measured along the tangent, so that the surface needs one; None where it is isotropic."""
-        return None
-
     def below(self, n: Scalar) -> Self:
         """The same boundary under a medium of index `n`: what has no index does not change."""
         return self

@@ -114,10 +114,6 @@ class Lafortune(TwoParts):
     def lobes(self) -> tuple[Lobe, ...]:
         return tuple(self._lobe(suffix) for suffix in ("", "_2", "_3") if getattr(self, f"ks{suffix}") is not None)
 
-    @property
-    def grain(self) -> str | None:
-        return next((name for name in ("cy", "cy_2", "cy_3") if getattr(self, name) is not None), None)
-
     def _lobe(self, suffix: str) -> LafortuneLobe:
         ks, cx, cy, cz, exponent = (getattr(self, f"{name}{suffix}") for name in ("ks", "cx", "cy", "cz", "exponent"))
         return LafortuneLobe(ks, jnp.stack([cx, cx if cy is None else cy, cz]), exponent)

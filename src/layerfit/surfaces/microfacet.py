@@ -25,10 +25,6 @@ class Microfacets(Surface, Lobe):
         return self.alpha if self.alpha_x is None else (self.alpha_x, self.alpha_y)
 
     @property
-    def grain(self) -> str | None:
-        return None if self.alpha_x is None else "alpha_x"
-
-    @property
     def lobes(self) -> tuple[Lobe, ...]:
         return (self,)
 
