@@ -25,6 +25,7 @@ from layerfit.surfaces import (
     Conductor,
     CookTorrance,
     Dielectric,
+    Flakes,
     Lafortune,
     Lambert,
     OrenNayar,
@@ -164,6 +165,8 @@ STACKS: dict[str, Stack] = {
     "corrected, absorption and thickness": Stack(
         (Coat(alpha=0.1, eta=1.5, absorption_per_mm=[1.0, 4.0, 12.0], thickness_um=50.0),), Conductor(alpha=0.2, **COPPER)
     ),
+    "flakes": Stack((), Flakes(**COPPER)),
+    "corrected over flakes": Stack((varnish(tau=None),), Flakes(coverage=0.6, albedo=[0.02, 0.05, 0.3], **COPPER)),
     "precise over conductor": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Precise()),
     "precise, narrow": Stack((varnish(alpha=0.025),), Conductor(alpha=0.02, **COPPER), Precise()),
     "precise, rough and conserving": Stack((varnish(alpha=0.5, eta=1.7),), Conductor(alpha=0.4, **COPPER), Precise("multi")),

@@ -44,7 +44,7 @@ def ggx_d_anisotropic(h: Vec3, alpha_x: Scalar, alpha_y: Scalar) -> Scalar:
 @chunk
 def beckmann_d(h: Vec3, alpha: Scalar) -> Scalar:
     """Beckmann density of facet normals (Cook and Torrance 1982, eq. 14, normalised)."""
-    return _beckmann((h[0] * h[0] + h[1] * h[1]) / (alpha * alpha), h[2], alpha * alpha)
+    return beckmann_by_slopes((h[0] * h[0] + h[1] * h[1]) / (alpha * alpha), h[2], alpha * alpha)
 
 
 @chunk
@@ -52,10 +52,11 @@ def beckmann_d_anisotropic(h: Vec3, alpha_x: Scalar, alpha_y: Scalar) -> Scalar:
     """Anisotropic Beckmann density of facet normals (Heitz 2014, eq. 80)."""
     x = h[0] / alpha_x
     y = h[1] / alpha_y
-    return _beckmann(x * x + y * y, h[2], alpha_x * alpha_y)
+    return beckmann_by_slopes(x * x + y * y, h[2], alpha_x * alpha_y)
 
 
-def _beckmann(stretched_xy2: Scalar, z: Scalar, area: Scalar) -> Scalar:
+def beckmann_by_slopes(stretched_xy2: Scalar, z: Scalar, area: Scalar) -> Scalar:
+    """Beckmann's density by the squared slope in widths, times z^2, and the product of the widths."""
     # The exponent goes to -infinity at the horizon, where D is 0: the guarded z keeps the derivative finite there.
     above = z > 1e-4
     z2 = jnp.where(above, z * z, 1.0)

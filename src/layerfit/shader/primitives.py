@@ -31,13 +31,16 @@ from .glsl import (
 from .helpers import HELPERS
 
 
-def _operator(symbol: str, binds: int, neutral: str | None = None, neutral_left: bool = False):
+def _operator(symbol: str, binds: int, neutral: str | None = None, neutral_left: bool = False, within: int | None = None):
+    """An infix operator. Brackets stand where they must, or round all that binds looser than `within`: who knows whether ^ or >> goes first?"""
+    within = binds if within is None else within
+
     def write(body: Any, eqn: Any, a: Value, b: Value) -> Value:
         if b.text == neutral:
             return a
         if a.text == neutral and neutral_left:
             return b
-        text = f"{bracketed(a, binds, False)} {symbol} {bracketed(b, binds, True)}"
+        text = f"{bracketed(a, within, False)} {symbol} {bracketed(b, within, True)}"
         return Value(text, wider(a, b), binds, reads(a, b))
 
     return write
@@ -164,9 +167,9 @@ PRIMITIVES: dict[str, Callable[..., Value]] = {
     "ne": _comparison("!=", "notEqual"),
     "and": _operator("&&", LOGIC),
     "or": _operator("||", LOGIC),
-    "xor": _operator("^", XOR),
-    "shift_right_logical": _operator(">>", SHIFT),
-    "not": lambda body, eqn, a: Value(f"!{bracketed(a, UNARY, True)}", a.type, UNARY, a.reads),
+    "xor": _operator("^", XOR, within=UNARY),
+    "shift_right_logical": _operator(">>", SHIFT, within=UNARY),
+    "not": lambda body, eqn, a: Value(f"{'!' if a.type == 'bool' else '~'}{bracketed(a, UNARY, True)}", a.type, UNARY, a.reads),
     "select_n": _select,
     "broadcast_in_dim": _passes,
     "reshape": _passes,

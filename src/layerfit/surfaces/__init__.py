@@ -2,6 +2,7 @@
 
 from .cosine import Blinn as Blinn, Phong as Phong
 from .diffuse import Lambert as Lambert, OrenNayar as OrenNayar
+from .flakes import Flakes as Flakes
 from .grooves import CookTorrance as CookTorrance, TorranceSparrow as TorranceSparrow
 from .lafortune import Lafortune as Lafortune
 from .microfacet import Conductor as Conductor, Dielectric as Dielectric
@@ -16,5 +17,6 @@ BASES = {
     "lafortune": Lafortune,
     "torrance_sparrow": TorranceSparrow,
     "cook_torrance": CookTorrance,
+    "flakes": Flakes,
 }
 """The surfaces by their name in a preset."""

@@ -1,0 +1,138 @@
+"""Metallic paint: flakes of metal in a pigmented ground, each with a normal of its own."""
+
+import dataclasses
+from collections.abc import Collection
+from typing import Any, ClassVar
+
+import jax.numpy as jnp
+
+from .._chunk import static
+from .._fields import choice, layer, param
+from .._place import TANGENT, Place
+from .._types import Colour, Number, Scalar, Vec2, Vec3
+from ..optics.flakes import flake_tilt, into_facet, kept_tilt, tilted_d, tilted_normal
+from ..optics.microfacet import Width, density, visibility
+from .base import Lobe, Surface, variance
+from .diffuse import Lambert
+from .microfacet import Metal, alpha_param, metal_eta, metal_k
+
+
+@layer
+class Flakes(Metal):
+    """Metal flakes, tilted one by one, with pigment between them (after Elek 2010, section 5; Guenther et al. 2005).
+
+    At a place of the surface the lobe stands about the normal of the flake there. Tilts are drawn less and less with the distance; the
+    variance that is lost returns as roughness, alpha^2 + (1 - s^2) sigma^2, so that the mean look does not change. Without a place, as in a
+    fit, the surface is seen from afar.
+    """
+
+    reads: ClassVar[tuple[str, ...]] = ("uv", "distance", TANGENT)
+
+    name: str = static(default="base", doc="name of the layer")
+    alpha: Number = alpha_param(default=0.1, which=" of one flake")
+    sigma: Number = param(
+        default=0.2, lower=0.0, upper=1.0, scale="softlog", soft=0.05, fitted=False, doc="spread of the tilts, as a width of slopes"
+    )
+    eta: Number = metal_eta()
+    k: Number = metal_k()
+    coverage: Number = param(default=None, lower=0.0, upper=1.0, scale="linear", doc="part of the area that is flakes; absent is all")
+    albedo: Number = param(
+        default=None, lower=0.0, upper=1.0, scale="linear", doc="pigment between flakes; absent is black", colour=True
+    )
+    per_uv: Number = param(
+        default=400.0, lower=1.0, upper=1e6, scale="log", fitted=False, doc="flakes along one unit of the texture coordinates"
+    )
+    half_distance: Number = param(
+        default=1.0, lower=1e-6, upper=1e6, scale="log", fitted=False, doc="distance at which half of the tilt is drawn, in the scene's unit"
+    )
+    seed: Number = param(default=0.0, lower=0.0, upper=2**24 - 1, scale="linear", fitted=False, doc="whole number; another one, other flakes")
+    lost: str = choice(default="roughness", others=("nothing",), doc="what becomes of the tilt that is not drawn")
+
+    @classmethod
+    def incomplete(cls, given: Collection[str]) -> str | None:
+        if "albedo" in given and "coverage" not in given:
+            return "albedo is that of the pigment between the flakes: give their coverage too"
+        return None
+
+    @property
+    def diffuse(self) -> Any:
+        return None if self.albedo is None else Lambert(albedo=(1.0 - self.coverage) * self.albedo)
+
+    @property
+    def lobes(self) -> tuple[Lobe, ...]:
+        return (FlakeLobe(self),)
+
+    def at(self, place: Place) -> Surface:
+        """The flake at a place of the surface."""
+        kept = kept_tilt(place.distance, self.half_distance)
+        tilt = flake_tilt(place.uv, self.per_uv, self.sigma * kept, self.seed.astype(jnp.uint32))
+        return Flake(self, tilt, kept)
+
+
+@dataclasses.dataclass(frozen=True)
+class Flake(Surface):
+    """One flake and the pigment beside it."""
+
+    paint: Flakes
+    tilt: Vec2
+    kept: Scalar
+    """Part s of the tilt that is drawn."""
+
+    @property
+    def diffuse(self) -> Any:
+        return self.paint.diffuse
+
+    @property
+    def lobes(self) -> tuple[Lobe, ...]:
+        return (FlakeLobe(self.paint, self),)
+
+
+@dataclasses.dataclass(frozen=True)
+class FlakeLobe(Lobe):
+    """Light that a flake sends back, or in the mean all of them."""
+
+    paint: Flakes
+    flake: Flake | None = None
+
+    @property
+    def width(self) -> Width:
+        """Of the facets of all flakes: what goes to and fro below a coat meets others."""
+        paint = self.paint
+        if paint.lost == "nothing":
+            return paint.alpha
+        return jnp.sqrt(paint.alpha * paint.alpha + paint.sigma * paint.sigma)
+
+    def reflectance(self, c: Scalar) -> Colour:
+        F = self.paint.reflectance(c)
+        return F if self.paint.coverage is None else self.paint.coverage * F
+
+    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+        if self.flake is None:
+            width = self.width if width is None else width
+            return density("beckmann", h, width) * visibility("smith", "beckmann", wi, wo, width)
+        if self.paint.lost == "nothing":
+            return self._in_its_frame(wi, wo, h, self.paint.alpha if width is None else width, self.flake)
+        return self._among_others(wi, wo, h, width, self.flake)
+
+    def _among_others(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None, flake: Flake) -> Scalar:
+        """The lobe about a flake. Flakes hide one another by the slopes of all: the mean over flakes is the lobe seen from afar."""
+        sigma2 = self.paint.sigma * self.paint.sigma
+        drawn = flake.kept * flake.kept
+        if width is None:
+            alpha2 = self.paint.alpha * self.paint.alpha + (1.0 - drawn) * sigma2
+        else:
+            alpha2 = variance(width) - drawn * sigma2
+        D = tilted_d(h, flake.tilt, jnp.sqrt(alpha2))
+        slopes = self.width if width is None else width
+        V = visibility("smith", "beckmann", wi, wo, slopes)
+        return D * V
+
+    def _in_its_frame(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, flake: Flake) -> Scalar:
+        """The lobe of a surface whose normal is that of the flake (Elek 2010): nothing where either direction is below it."""
+        n = tilted_normal(flake.tilt)
+        up = jnp.array([0.0, 0.0, 1.0], n.dtype)
+        wi_flake, wo_flake = into_facet(wi, n), into_facet(wo, n)
+        lit = (wi_flake[2] > 0.0) & (wo_flake[2] > 0.0)
+        D = density("beckmann", into_facet(h, n), width)
+        V = visibility("smith", "beckmann", jnp.where(lit, wi_flake, up), jnp.where(lit, wo_flake, up), width)
+        return jnp.where(lit, D * V, 0.0)
