@@ -22,6 +22,7 @@ from layerfit.layers import Coat
 from layerfit.stack import Stack, evaluate
 from layerfit.surfaces import (
     Blinn,
+    CarPaint,
     Conductor,
     CookTorrance,
     Dielectric,
@@ -165,6 +166,7 @@ STACKS: dict[str, Stack] = {
     "corrected, absorption and thickness": Stack(
         (Coat(alpha=0.1, eta=1.5, absorption_per_mm=[1.0, 4.0, 12.0], thickness_um=50.0),), Conductor(alpha=0.2, **COPPER)
     ),
+    "car_paint": Stack((), CarPaint(kd=0.05, ks=0.06, ks_2=[0.1, 0.12, 0.13], f0_2=0.8, alpha_2=0.15, scaling="cook_torrance")),
     "flakes": Stack((), Flakes(**COPPER)),
     "corrected over flakes": Stack((varnish(tau=None),), Flakes(coverage=0.6, albedo=[0.02, 0.05, 0.3], **COPPER)),
     "precise over conductor": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Precise()),
@@ -191,6 +193,7 @@ BELOW_COATS: dict[str, Stack] = {
     "corrected over torrance_sparrow": Stack((varnish(tau=None),), TorranceSparrow(ks=12.0, kappa=7.0, **COPPER)),
     "corrected over cook_torrance": Stack((varnish(),), CookTorrance(alpha=0.25, ks=0.6, kd=0.2, **COPPER)),
     "corrected over phong, faithful": Stack((varnish(),), Phong(kd=0.1, ks=0.1, exponent=40.0, scaling="faithful")),
+    "corrected over car_paint": Stack((varnish(),), CarPaint(kd=WOOD, ks_2=[0.1, 0.2, 0.3], f0_2=0.8, alpha_2=0.15)),
     "faithful over blinn": Stack((varnish(),), Blinn(kd=0.1, ks=0.2, exponent=20.0, scaling="faithful"), Faithful()),
 }
 """The bases that say little new below a coat: for fewer tests."""

@@ -35,9 +35,11 @@ from .shader.verify import (
 from .stack import Stack as Stack
 from .surfaces import (
     Blinn as Blinn,
+    CarPaint as CarPaint,
     Conductor as Conductor,
     CookTorrance as CookTorrance,
     Dielectric as Dielectric,
+    Flakes as Flakes,
     Lafortune as Lafortune,
     Lambert as Lambert,
     OrenNayar as OrenNayar,

@@ -1,5 +1,6 @@
 """One boundary each: what reflects light at the bottom of a stack, or on its own."""
 
+from .car_paint import CarPaint as CarPaint
 from .cosine import Blinn as Blinn, Phong as Phong
 from .diffuse import Lambert as Lambert, OrenNayar as OrenNayar
 from .flakes import Flakes as Flakes
@@ -17,6 +18,7 @@ BASES = {
     "lafortune": Lafortune,
     "torrance_sparrow": TorranceSparrow,
     "cook_torrance": CookTorrance,
+    "car_paint": CarPaint,
     "flakes": Flakes,
 }
 """The surfaces by their name in a preset."""
