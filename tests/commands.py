@@ -102,9 +102,9 @@ def process(*arguments: Any, environment: Mapping[str, str] | None = None, cwd: 
     return Ran(ran.returncode, ran.stdout, ran.stderr)
 
 
-def write_reference(folder: Path) -> Path:
+def write_reference(folder: Path, truth: Mapping[str, Any] = TRUTH) -> Path:
     """Write the truth, a render of it, and the scene that looks for it; returns the scene."""
-    (folder / "truth.json").write_text(json.dumps(TRUTH))
+    (folder / "truth.json").write_text(json.dumps(truth))
     write_exr(folder / "reference.exr", {channel: np.ones((SIDE, SIDE)) for channel in "RGB"})
     scene = folder / "scene.toml"
     scene.write_text(SCENE)

@@ -154,9 +154,18 @@ def test_the_shader_asks_for_what_flakes_need():
 
 
 def test_a_preset_holds_flakes():
-    document = {"type": "flakes", "name": "base", "alpha": 0.1, "sigma": 0.2, "eta": 1.4, "k": 7.0, "seed": 7.0, "lost": "nothing"}
+    document = {
+        "type": "flakes",
+        "name": "base",
+        "alpha": 0.1,
+        "sigma": 0.2,
+        "eta": 1.4,
+        "k": 7.0,
+        "seed": 7.0,
+        "lost": "nothing",
+    }
     stack = stack_of({"base": document}, "here")
     again = preset_of(stack, "paint")["base"]
     assert {key: again[key] for key in document} == document
-    with pytest.raises(InputError, match="give their coverage too"):
+    with pytest.raises(InputError, match="come together; coverage is missing"):
         stack_of({"base": {"type": "flakes", "albedo": 0.2}}, "here")

@@ -31,6 +31,16 @@ def reads(*layers: Any) -> tuple[str, ...]:
     return tuple(name for name in INPUTS if name in read)
 
 
+def needs(*layers: Any) -> tuple[str, ...]:
+    """What of it they cannot do without: those that say `averages` are seen as they are in the mean where there is no place."""
+    return reads(*(layer for layer in layers if not getattr(layer, "averages", False)))
+
+
+def narrowed(place: Place | None, names: tuple[str, ...]) -> Place | None:
+    """A place with these of its parts alone; None where there are none."""
+    return Place(**{name: getattr(place, name) for name in names}) if names and place is not None else None
+
+
 ORIENTED = ("alpha_x", "cy", "cy_2", "cy_3")
 """Fields that are measured along the tangent or across it: where one is given, a surface has a grain."""
 

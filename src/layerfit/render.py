@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ._compiled import Compiled
-from ._place import Place
+from ._place import Place, narrowed
 from .stack import Stack, at, evaluate
 
 
@@ -86,6 +86,7 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, pl
         weight = np.pad(weight, ((0, 0), (0, missing), (0, 0)))
     size = block_size(each)
     stack = stack.astype(np.float32)
+    place = narrowed(place, stack.reads)
     rows = []
     with jax.enable_x64(False):
         for start in range(0, len(wo), size):
@@ -113,6 +114,7 @@ def brdf(stack: Stack, wi: Float[Array, "n 3"], wo: Float[Array, "n 3"], place: 
     dtype = jnp.result_type(jnp.float32, wi, wo)
     stack = stack.astype(dtype)
     prepared = stack.prepare()
+    place = narrowed(place, stack.reads)
     wi, wo = (jnp.asarray(w, dtype) for w in (wi, wo))
     place = jax.tree.map(lambda a: jnp.asarray(a, dtype), place)
 

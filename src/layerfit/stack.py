@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from ._chunk import static, struct
-from ._place import Place, reads
+from ._place import Place, needs, reads
 from ._types import Colour, Vec3
 from .forms import corrected, faithful, patina, precise, weathering
 
@@ -43,6 +43,11 @@ class Stack:
     def reads(self) -> tuple[str, ...]:
         """What this material reads of a `Place` of the surface: nothing where it is the same everywhere."""
         return reads(*self.layers, self.base)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """What of it this material cannot do without: what a fit gives it. Flakes are fitted by their mean."""
+        return needs(*self.layers, self.base)
 
     def without(self, name: str) -> "Stack":
         """The same material with one layer taken off."""

@@ -14,14 +14,15 @@ import numpy as np
 from ..errors import InputError
 from .exr import Exr
 
-ROLES = ("beauty", "alpha", "normal", "position", "tangent", "depth", "noise")
+ROLES = ("beauty", "alpha", "normal", "position", "tangent", "uv", "depth", "noise")
 """Also the keys of the scene file's [reference] that say where a role is."""
 
-_SUFFIXES = {  # the channels of a layer that make a vector; roles that are not here are one number
+_SUFFIXES = {  # the channels of a layer that make a vector, three or two; roles that are not here are one number
     "beauty": ("RGB", "rgb"),
     "normal": ("XYZ", "RGB", "xyz", "rgb"),
     "position": ("XYZ", "RGB", "xyz", "rgb"),
     "tangent": ("XYZ", "RGB", "xyz", "rgb"),
+    "uv": ("UV", "uv", "XY", "RG", "xy", "rg"),
     "noise": ("RGB", "rgb"),
 }
 _SINGLE = "ZTVYARztvyar"
@@ -33,6 +34,7 @@ _NAMES = {
     "normal": ("N", "normal", "normals", "sh_normal", "Ns", "Normal"),
     "position": ("P", "position", "worldPositions", "Position", "WP"),
     "tangent": ("T", "tangent", "Tangent", "dp_du"),
+    "uv": ("UV", "uv", "st", "ST", "texcoord"),
     "depth": ("Z", "depth", "zDepth", "Depth", "T", "Pz"),
     "noise": ("SE",),
 }
@@ -53,6 +55,8 @@ class Channels:
     position: np.ndarray | None
     tangent: np.ndarray | None
     """Along which an anisotropic surface is brushed."""
+    uv: np.ndarray | None
+    """Texture coordinates, (H, W, 2)."""
     depth: np.ndarray | None
     noise: np.ndarray | None
     chosen: dict[str, str]
@@ -104,6 +108,7 @@ def resolve(exr: Exr, overrides: Mapping[str, str] | None = None, need: Collecti
         normal=array("normal"),
         position=array("position"),
         tangent=array("tangent"),
+        uv=array("uv"),
         depth=array("depth"),
         noise=array("noise"),
         chosen=chosen,
@@ -130,7 +135,7 @@ def _overridden(exr: Exr, role: str, value: str) -> _Candidate | None:
         return None
     wanted = tuple(text.strip() for text in value.split(","))
     layers = _layers(exr)
-    size = 3 if role in _SUFFIXES else 1
+    size = _size(role)
     why = f'the scene says {role} = "{value}"'
     absent = [name for name in wanted if name not in exr.channels]
     if not absent and len(wanted) == size:
@@ -139,12 +144,18 @@ def _overridden(exr: Exr, role: str, value: str) -> _Candidate | None:
     if layer and (names := _in_layer(layers.get(layer, {}), role)):
         return _Candidate(names, layer, why)
     if not absent or (layer and layer in layers):
-        form = f"three channels or a layer with {' or '.join(_SUFFIXES[role])}" if size == 3 else "one channel or its layer"
+        count = {2: "two", 3: "three"}.get(size)
+        form = f"{count} channels or a layer with {' or '.join(_SUFFIXES[role])}" if count else "one channel or its layer"
         raise InputError(f'{exr.path}: {role} = "{value}" of the scene is not {form}; {_there(exr)}')
     if absent[0] in exr.left_out:
         raise InputError(f'{exr.path}: {role} = "{value}" of the scene was not read: {exr.left_out[absent[0]]}')
     near = _nearest(absent[0], [*filter(None, layers), *exr.channels])
     raise InputError(f'{exr.path}: {role} = "{value}" of the scene is not in the file{near}; {_there(exr)}')
+
+
+def _size(role: str) -> int:
+    """How many channels a role has."""
+    return len(_SUFFIXES[role][0]) if role in _SUFFIXES else 1
 
 
 def _best(exr: Exr, role: str, beside: str) -> _Candidate | None:

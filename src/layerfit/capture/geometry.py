@@ -61,6 +61,14 @@ def frames(normal: np.ndarray, tangent: np.ndarray | None) -> np.ndarray:
     return np.stack([tangent, np.cross(normal, tangent), normal], -2)
 
 
+def sphere_uv(normal: np.ndarray, up: tuple[float, float, float]) -> np.ndarray:
+    """Texture coordinates (..., 2) of a sphere: u once around the axis `up`, along `sphere_tangent`, v from its pole to the other."""
+    axis = normalise(np.asarray(up, float))
+    start = normalise(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
+    x, y, z = normal @ start, normal @ np.cross(axis, start), normal @ axis
+    return np.stack([np.arctan2(y, x) / (2.0 * np.pi) + 0.5, np.arctan2(np.hypot(x, y), z) / np.pi], -1)
+
+
 def sphere_tangent(normal: np.ndarray, up: tuple[float, float, float]) -> np.ndarray:
     """Tangents along the circles of latitude around `up`: the direction in which a lathe brushes."""
     return normalise(np.cross(np.asarray(up, float), normal))

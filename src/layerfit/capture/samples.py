@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .._place import grain
+from .._place import Place, grain
 from ..errors import InputError
 from ..stack import Stack
 from .channels import Channels, resolve
 from .exr import read_exr
-from .geometry import Surface, frames, normalise, sphere_surface, sphere_tangent
+from .geometry import Surface, frames, normalise, sphere_surface, sphere_tangent, sphere_uv
 from .lights import is_exact, receive
 from .png import read_png
 from .scene import Reference, Scene
@@ -44,11 +44,13 @@ class Samples:
     index: np.ndarray
     """Row-major place of each pixel in the image."""
     shape: tuple[int, int]
+    place: Place | None = None
+    """Where on the surface each pixel is: texture coordinates (pixels, 2) where there are any, distance to the camera (pixels,)."""
 
     @property
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """wi, wo and weight: what a material is evaluated at."""
-        return self.wi, self.wo, self.weight
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, Place | None]:
+        """wi, wo, weight and place: what a material is evaluated at."""
+        return self.wi, self.wo, self.weight, self.place
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,6 +63,7 @@ class View:
     position: np.ndarray
     normal: np.ndarray
     tangent: np.ndarray | None
+    uv: np.ndarray | None
     view: np.ndarray
     index: np.ndarray
     shape: tuple[int, int]
@@ -94,6 +97,12 @@ class View:
                 f'with tangent = "..." under [reference], give [geometry] kind = "sphere", or leave {oriented[0]} out for an isotropic one'
             )
 
+        if "uv" in stack.reads and self.uv is None:
+            raise InputError(
+                f"{self.reference.exr}: the material varies over the surface, and there are no texture coordinates. Render a uv channel, name "
+                'it with uv = "..." under [reference], or give [geometry] kind = "sphere"'
+            )
+
     def scales(self, stack: Stack) -> np.ndarray | None:
         """Thickness of each coat in this image over that of the material, or None where all are 1."""
         scale = [self.reference.thickness_scale.get(layer.name, 1.0) for layer in stack.layers]
@@ -113,7 +122,13 @@ class View:
             noise=None if self.noise is None else self.noise[which].astype(np.float32),
             index=self.index[which],
             shape=self.shape,
+            place=self._place(which),
         )
+
+    def _place(self, which: np.ndarray) -> Place:
+        away = np.asarray(self.reference.camera.position) - self.position[which]
+        uv = None if self.uv is None else self.uv[which].astype(np.float32)
+        return Place(uv, np.linalg.norm(away, axis=-1).astype(np.float32))
 
 
 def load(scene: Scene, min_cosine: float | None = None) -> list[View]:
@@ -126,7 +141,7 @@ def load_reference(reference: Reference, min_cosine: float) -> View:
     """Read a reference render and keep the pixels that can be compared: covered, finite, seen and lit at no grazing angle."""
     channels = resolve(read_exr(reference.exr), dict(reference.channels))
     height, width = channels.beauty.shape[:2]
-    surface, tangent = _surface(reference, channels, height, width)
+    surface, tangent, uv = _surface(reference, channels, height, width)
     eye = np.asarray(reference.camera.position)
     if reference.geometry and np.linalg.norm(eye - reference.geometry.center) <= reference.geometry.radius:
         raise InputError(f"{reference.exr}: the camera stands inside the sphere; check camera.position and geometry.radius")
@@ -179,6 +194,7 @@ def load_reference(reference: Reference, min_cosine: float) -> View:
         position=pick(surface.position),
         normal=pick(surface.normal),
         tangent=None if tangent is None else pick(tangent),
+        uv=None if uv is None else uv.reshape(-1, 2)[index],
         view=pick(view),
         index=index,
         shape=(height, width),
@@ -191,10 +207,14 @@ def _unlit(reference: Reference) -> str:
     return f"{reference.exr}: no light reaches the visible side of the object; check where the lights in [[light]] are, and how bright"
 
 
-def _surface(reference: Reference, channels: Channels, height: int, width: int) -> tuple[Surface, np.ndarray | None]:
+def _surface(
+    reference: Reference, channels: Channels, height: int, width: int
+) -> tuple[Surface, np.ndarray | None, np.ndarray | None]:
+    """The surface, its tangents and its texture coordinates."""
     if reference.geometry:
         surface = sphere_surface(reference.geometry, reference.camera, height, width)
-        return surface, sphere_tangent(surface.normal, reference.camera.up)
+        up = reference.camera.up
+        return surface, sphere_tangent(surface.normal, up), sphere_uv(surface.normal, up)
     if channels.normal is None or channels.position is None:
         missing = "normal" if channels.normal is None else "position"
         raise InputError(
@@ -209,7 +229,8 @@ def _surface(reference: Reference, channels: Channels, height: int, width: int) 
         # Without coverage, a pixel at a silhouette shows in its neighbours: some of them are empty.
         covered = _eroded(covered)
     tangent = None if channels.tangent is None else channels.tangent.astype(float)
-    return Surface(channels.position.astype(float), normalise(channels.normal.astype(float)), covered), tangent
+    surface = Surface(channels.position.astype(float), normalise(channels.normal.astype(float)), covered)
+    return surface, tangent, None if channels.uv is None else channels.uv.astype(float)
 
 
 def _eroded(mask: np.ndarray) -> np.ndarray:

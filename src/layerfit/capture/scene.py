@@ -141,7 +141,7 @@ def read_scene(path: str | Path) -> Scene:
     )
 
 
-_CHANNEL_KEYS = ("beauty", "alpha", "normal", "position", "tangent", "depth", "noise")
+_CHANNEL_KEYS = ("beauty", "alpha", "normal", "position", "tangent", "uv", "depth", "noise")
 
 
 def _references(entry: Any, document: Mapping[str, Any], path: Path, where: str) -> list[Reference]:

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._chunk import struct
+from .._place import Place
 from ..capture.samples import Samples
 from ..render import block_size
 
@@ -27,6 +28,8 @@ class Block:
     inverse_sigma: Float[Array, "3 n"]
     scale: Any
     """(layers,): thickness over that of the material; absent where it is 1 everywhere."""
+    place: Place | None = None
+    """Where the pixels are on the surface; absent where the material is the same everywhere, or is fitted by its mean."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,8 +68,13 @@ def stratified(samples: Samples, seed: int) -> np.ndarray:
     return np.argsort(key)
 
 
-def arrange(references: list[Samples], scales: np.ndarray | None, seed: int) -> tuple[list[Block], Layout]:
-    """Blocks of all references; `scales` (references, layers) or None. The references take turns, block by block."""
+def arrange(
+    references: list[Samples], scales: np.ndarray | None, seed: int, needs: tuple[str, ...] = ()
+) -> tuple[list[Block], Layout]:
+    """Blocks of all references; `scales` (references, layers) or None; `needs` is what the material has to know of the place of a pixel.
+
+    The references take turns, block by block.
+    """
     lights = max(s.wi.shape[1] for s in references)
     longest = max(len(s.index) for s in references)
     size = min(block_size(lights), _power_of_two(longest))
@@ -97,8 +105,13 @@ def arrange(references: list[Samples], scales: np.ndarray | None, seed: int) -> 
     wo[empty] = up
     weight = channels_first(layout.scatter([padded("weight", s) for s in references], 0.0))
     target = channels_first(layout.scatter([s.target for s in references], 0.0))
+    where = {name: layout.scatter([getattr(s.place, name) for s in references], 0.0) for name in needs}
+
+    def there(b: int) -> Place | None:
+        return Place(**{name: values[b] for name, values in where.items()}) if where else None
+
     blocks = [
-        jax.device_put(Block(wi[b], wo[b], weight[b], target[b], np.zeros_like(target[b]), _scale(scales, k)))
+        jax.device_put(Block(wi[b], wo[b], weight[b], target[b], np.zeros_like(target[b]), _scale(scales, k), there(b)))
         for b, (k, _) in enumerate(rows)
     ]
     return blocks, layout

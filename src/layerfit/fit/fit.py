@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from .._compiled import CLOCK
+from .._place import narrowed
 from ..capture.samples import QUADRATURE, Samples, View
 from ..errors import InputError
 from ..render import predict
@@ -78,7 +79,7 @@ class _Fit:
         self.clock = dataclasses.replace(CLOCK)
         self.began = time.perf_counter()
         self.samples = [view.samples(_chosen(view, len(views), seed), DIRECTIONS, seed) for view in views]
-        self.blocks, self.layout = arrange(self.samples, _scales(views, start), seed)
+        self.blocks, self.layout = arrange(self.samples, _scales(views, start), seed, start.needs)
         self.solver = NormalLevenbergMarquardt()
         self._set_bounds()
 
@@ -150,8 +151,8 @@ class _Fit:
     def _models(self, u: np.ndarray) -> list[np.ndarray]:
         stack = self._material(u)
         return [
-            predict(scaled(stack, view.scales(stack)), *samples.arrays)
-            for view, samples in zip(self.views, self.samples, strict=True)
+            predict(scaled(stack, view.scales(stack)), s.wi, s.wo, s.weight, narrowed(s.place, stack.needs))
+            for view, s in zip(self.views, self.samples, strict=True)
         ]
 
     def _material(self, u: np.ndarray) -> Stack:

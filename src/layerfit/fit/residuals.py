@@ -39,7 +39,7 @@ def _columns(u: Any, start: Stack, block: Block, *, free: Parametrisation) -> An
     """The model's derivatives and residual over one block of pixels at `u`, in the precision of the block."""
 
     def residual(fields: list[Any]) -> Any:
-        model = channels(_material(start, free, fields, block), block.wi, block.wo, block.weight)
+        model = channels(_material(start, free, fields, block), block.wi, block.wo, block.weight, block.place)
         return (model - block.target) * block.inverse_sigma
 
     return columns(residual, free.fields(u))

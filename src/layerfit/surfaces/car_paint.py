@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from collections.abc import Collection
 from typing import Any, ClassVar
 
 import jax.numpy as jnp
@@ -12,8 +11,8 @@ from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from ..optics.fresnel import fresnel_schlick
 from ..optics.microfacet import Width, density, v_cavity
-from .base import Lobe, Surface
-from .diffuse import Lambert
+from .base import Lobe
+from .diffuse import TwoParts, kd_param
 from .microfacet import alpha_param
 
 SCALES = {"normalized": 1.0, "rump": 4.0 / math.pi, "cook_torrance": 4.0}
@@ -50,11 +49,13 @@ def _ks(default: float | None) -> Any:
 
 
 def _f0(default: float | None) -> Any:
-    return param(default=default, lower=0.0, upper=1.0, scale="linear", doc="reflectance of its facets at the normal", fitted=False)
+    return param(
+        default=default, lower=0.0, upper=1.0, scale="linear", doc="reflectance of its facets at the normal", fitted=False
+    )
 
 
 @layer
-class CarPaint(Surface):
+class CarPaint(TwoParts):
     """A diffuse part beside up to three Cook-Torrance lobes: kd / pi + sum of ks F D G / (q NoL NoV).
 
     Widths are the paper's m. `scaling` says what q is, and so what `ks` means: 4 with the normalised D; pi with it, as by Rump et al. 2008;
@@ -62,8 +63,10 @@ class CarPaint(Surface):
     A second and third lobe are there where all of their fields are. A lobe may stand for the clear coat, or there is a coat above.
     """
 
+    together: ClassVar = (("ks_2", "f0_2", "alpha_2"), ("ks_3", "f0_3", "alpha_3"))
+
     name: str = static(default="base", doc="name of the layer")
-    kd: Number = param(default=None, lower=0.0, upper=1.0, scale="linear", doc="diffuse part", colour=True)
+    kd: Number = kd_param()
     ks: Number = _ks(0.1)
     f0: Number = _f0(0.5)
     alpha: Number = alpha_param(default=0.3, which=" of the lobe")
@@ -77,24 +80,10 @@ class CarPaint(Surface):
         default="normalized", others=("rump", "cook_torrance"), doc="lobes by the light that they send back, or as published"
     )
 
-    FIELDS: ClassVar[tuple[str, ...]] = ("ks", "f0", "alpha")
-
-    @property
-    def diffuse(self) -> Any:
-        return None if self.kd is None else Lambert(albedo=self.kd)
-
     @property
     def lobes(self) -> tuple[Lobe, ...]:
         return tuple(self._lobe(suffix) for suffix in ("", "_2", "_3") if getattr(self, f"ks{suffix}") is not None)
 
-    @classmethod
-    def incomplete(cls, given: Collection[str]) -> str | None:
-        for suffix in ("_2", "_3"):
-            needed = [f"{name}{suffix}" for name in cls.FIELDS]
-            missing = [name for name in needed if name not in given]
-            if missing and len(missing) < len(needed):
-                return f"a further lobe has {', '.join(needed)} together; {missing[0]} is missing"
-        return None
-
     def _lobe(self, suffix: str) -> PaintLobe:
-        return PaintLobe(*(getattr(self, f"{name}{suffix}") for name in self.FIELDS), SCALES[self.scaling])
+        ks, f0, alpha = (getattr(self, f"{name}{suffix}") for name in ("ks", "f0", "alpha"))
+        return PaintLobe(ks, f0, alpha, SCALES[self.scaling])

@@ -1,7 +1,6 @@
 """Metallic paint: flakes of metal in a pigmented ground, each with a normal of its own."""
 
 import dataclasses
-from collections.abc import Collection
 from typing import Any, ClassVar
 
 import jax.numpy as jnp
@@ -27,32 +26,43 @@ class Flakes(Metal):
     """
 
     reads: ClassVar[tuple[str, ...]] = ("uv", "distance", TANGENT)
+    averages: ClassVar[bool] = True
+    together: ClassVar = (("coverage", "albedo"),)
 
     name: str = static(default="base", doc="name of the layer")
     alpha: Number = alpha_param(default=0.1, which=" of one flake")
     sigma: Number = param(
-        default=0.2, lower=0.0, upper=1.0, scale="softlog", soft=0.05, fitted=False, doc="spread of the tilts, as a width of slopes"
+        default=0.2,
+        lower=0.0,
+        upper=1.0,
+        scale="softlog",
+        soft=0.05,
+        fitted=False,
+        doc="spread of the tilts, as a width of slopes",
     )
     eta: Number = metal_eta()
     k: Number = metal_k()
-    coverage: Number = param(default=None, lower=0.0, upper=1.0, scale="linear", doc="part of the area that is flakes; absent is all")
+    coverage: Number = param(
+        default=None, lower=0.0, upper=1.0, scale="linear", doc="part of the area that is flakes; absent: all of it"
+    )
     albedo: Number = param(
-        default=None, lower=0.0, upper=1.0, scale="linear", doc="pigment between flakes; absent is black", colour=True
+        default=None, lower=0.0, upper=1.0, scale="linear", doc="light that the pigment between flakes sends back", colour=True
     )
     per_uv: Number = param(
         default=400.0, lower=1.0, upper=1e6, scale="log", fitted=False, doc="flakes along one unit of the texture coordinates"
     )
     half_distance: Number = param(
-        default=1.0, lower=1e-6, upper=1e6, scale="log", fitted=False, doc="distance at which half of the tilt is drawn, in the scene's unit"
+        default=1.0,
+        lower=1e-6,
+        upper=1e6,
+        scale="log",
+        fitted=False,
+        doc="distance at which half of the tilt is drawn, in the scene's unit",
     )
-    seed: Number = param(default=0.0, lower=0.0, upper=2**24 - 1, scale="linear", fitted=False, doc="whole number; another one, other flakes")
+    seed: Number = param(
+        default=0.0, lower=0.0, upper=2**24 - 1, scale="linear", fitted=False, doc="whole number; another one, other flakes"
+    )
     lost: str = choice(default="roughness", others=("nothing",), doc="what becomes of the tilt that is not drawn")
-
-    @classmethod
-    def incomplete(cls, given: Collection[str]) -> str | None:
-        if "albedo" in given and "coverage" not in given:
-            return "albedo is that of the pigment between the flakes: give their coverage too"
-        return None
 
     @property
     def diffuse(self) -> Any:
@@ -61,6 +71,11 @@ class Flakes(Metal):
     @property
     def lobes(self) -> tuple[Lobe, ...]:
         return (FlakeLobe(self),)
+
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """What it does without, in words."""
+        return ("pigment",) if self.albedo is None else ()
 
     def at(self, place: Place) -> Surface:
         """The flake at a place of the surface."""
@@ -116,12 +131,9 @@ class FlakeLobe(Lobe):
 
     def _among_others(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None, flake: Flake) -> Scalar:
         """The lobe about a flake. Flakes hide one another by the slopes of all: the mean over flakes is the lobe seen from afar."""
-        sigma2 = self.paint.sigma * self.paint.sigma
+        alpha, sigma2 = self.paint.alpha, self.paint.sigma * self.paint.sigma
         drawn = flake.kept * flake.kept
-        if width is None:
-            alpha2 = self.paint.alpha * self.paint.alpha + (1.0 - drawn) * sigma2
-        else:
-            alpha2 = variance(width) - drawn * sigma2
+        alpha2 = alpha * alpha + (1.0 - drawn) * sigma2 if width is None else variance(width) - drawn * sigma2
         D = tilted_d(h, flake.tilt, jnp.sqrt(alpha2))
         slopes = self.width if width is None else width
         V = visibility("smith", "beckmann", wi, wo, slopes)
