@@ -18,9 +18,10 @@ from layerfit.forms.faithful import Faithful
 from layerfit.forms.growth import Cover
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat, Patina
+from layerfit.materials.patina import copper_patina
 from layerfit.optics.growth import coverage, grown, onset, partly_grown, tarnish_thickness
 from layerfit.optics.noise import fbm, value_noise
-from layerfit.preset import preset_of, stack_of
+from layerfit.preset import preset_of, read_preset, stack_of
 from layerfit.render import brdf, predict
 from layerfit.shader.export import HEADERS, print_material
 from layerfit.shader.verify import check_pairs
@@ -282,3 +283,21 @@ def test_a_patina_that_cannot_be_is_refused(document, message):
 def test_a_patina_that_cannot_be_is_refused_in_python(stack):
     with pytest.raises(InputError, match="patina"):
         stack.astype(np.float32).prepare()
+
+
+def test_the_shipped_patina_is_that_of_the_function():
+    shipped, made = read_preset("patinated_copper"), copper_patina()
+    for a, b in zip(jax.tree.leaves(shipped), jax.tree.leaves(made), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-6)
+
+
+@pytest.mark.parametrize("years", [10.0, 100.0])
+def test_the_shipped_patina_sends_back_no_more_than_it_gets_at_any_place(years):
+    stack = copper_patina(years=years, softness=None).astype(np.float32)
+    wo = hemisphere(8192, 3)
+    for theta in (0.2, 1.2):
+        wi = np.broadcast_to([np.sin(theta), 0.0, np.cos(theta)], wo.shape)
+        for uv in ([0.1, 0.2], [0.6, 0.9]):
+            values = predict(stack, wi[:, None], wo, np.ones((8192, 1, 3)), Place(np.broadcast_to(uv, (8192, 2))))
+            albedo = 0.98 * 2.0 * np.pi * np.mean(values * wo[:, 2:], 0)
+            assert np.all(albedo < 1.0), albedo

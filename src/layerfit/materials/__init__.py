@@ -1,0 +1,1 @@
+"""Materials of the literature as functions that return a `Stack`."""
