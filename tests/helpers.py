@@ -197,3 +197,17 @@ BELOW_COATS: dict[str, Stack] = {
     "faithful over blinn": Stack((varnish(),), Blinn(kd=0.1, ks=0.2, exponent=20.0, scaling="faithful"), Faithful()),
 }
 """The bases that say little new below a coat: for fewer tests."""
+
+APPROXIMATE: dict[str, Stack] = {
+    "conductor, Schlick": Stack((), Conductor(alpha=0.2, fresnel="schlick", **COPPER)),
+    "conductor, Lazanyi": Stack((), Conductor(alpha=0.2, fresnel="lazanyi", **COPPER)),
+    "dielectric, Lazanyi": Stack((), Dielectric(alpha=0.3, eta=1.5, fresnel="lazanyi")),
+    "corrected, Schlick and Lazanyi": Stack((varnish(fresnel="schlick"),), Conductor(alpha=0.2, fresnel="lazanyi", **COPPER)),
+    "corrected, into a rarer coat": Stack(
+        (varnish(eta=1.7), Coat(name="primer", alpha=0.2, eta=1.35, tau=0.3, fresnel="schlick")),
+        Lambert(albedo=WOOD),
+    ),
+    "precise over Lazanyi": Stack((varnish(),), Conductor(alpha=0.2, fresnel="lazanyi", **COPPER), Precise()),
+    "faithful, Lazanyi": Stack((varnish(fresnel="lazanyi"),), CookTorrance(fresnel="lazanyi", **COPPER), Faithful()),
+}
+"""Fresnel reflectances that are not exact."""

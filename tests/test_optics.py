@@ -16,6 +16,7 @@ from layerfit.optics.fresnel import (
     transmittance_dielectric,
 )
 from layerfit.optics.interface import slope_spread, steer
+from layerfit.optics.lazanyi import Lazanyi, fit_lazanyi, fresnel_lazanyi
 from layerfit.optics.medium import refract_about_facet, refract_about_normal
 from layerfit.optics.microfacet import density, half_cosine, half_vector, visibility
 
@@ -48,6 +49,48 @@ def test_fresnel_conductor_has_its_digits(oracle, dtype):
 def test_schlick_has_its_digits(oracle, dtype):
     for case in cases(oracle)["fresnel_schlick"]:
         held(fresnel_schlick, (case["in"]["c"], case["in"]["f0"]), float(case["out"]), dtype)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_lazanyi_has_its_digits(oracle, dtype):
+    def F(c, n, k, a, alpha):
+        return fresnel_lazanyi(c, conductor_f0(n, k), a, alpha)
+
+    for case in cases(oracle)["fresnel_lazanyi"]:
+        held(F, [case["in"][k] for k in ("c", "n", "k", "a", "al")], float(case["out"]), dtype)
+
+
+def largest_error(fit, eta, k):
+    c = jnp.asarray(np.cos(np.linspace(0.0, 0.5 * np.pi, 500)))
+    f0 = conductor_f0(jnp.asarray(eta), jnp.asarray(k))
+    by_fit = jax.vmap(lambda c: fresnel_lazanyi(c, f0, fit.a, fit.alpha))(c)
+    return np.max(np.abs(by_fit - jax.vmap(lambda c: fresnel_conductor(c, jnp.asarray(eta), jnp.asarray(k)))(c)), 0)
+
+
+def test_lazanyi_is_fitted_to_each_metal():
+    """Aluminium, of which Schlick's formula is far off, and copper: the error is the one that is told, and far smaller."""
+    for eta, k, better in (([1.34, 0.97, 0.62], [7.47, 6.4, 5.3], 0.085), ([0.201, 0.924, 1.102], [3.913, 2.453, 2.142], 0.5)):
+        fit = fit_lazanyi(eta, k)
+        error = largest_error(fit, eta, k)
+        np.testing.assert_allclose(error, fit.error, rtol=0.02)
+        schlick = largest_error(Lazanyi(jnp.zeros(3), fit.alpha, fit.error), eta, k)
+        assert np.all(error < better * schlick)
+
+
+def test_lazanyi_is_never_worse_than_schlick():
+    rng = np.random.default_rng(0)
+    eta, k = np.exp(rng.uniform(np.log(0.05), np.log(5.0), 60)), rng.uniform(0.0, 9.0, 60)
+    for n, absorbs in zip(eta, k, strict=True):
+        fit = fit_lazanyi(n, absorbs)
+        plain = largest_error(Lazanyi(jnp.zeros(()), fit.alpha, fit.error), n, absorbs)
+        assert float(fit.error) <= plain * 1.001 + 1e-4
+
+
+def test_the_fit_follows_the_index():
+    """A fit of a metal's index has derivatives through the constants."""
+    slope = jax.grad(lambda n: fit_lazanyi(n, 3.9).a)(0.2)
+    difference = (fit_lazanyi(0.2002, 3.9).a - fit_lazanyi(0.1998, 3.9).a) / 0.0004
+    assert float(slope) == pytest.approx(float(difference), rel=1e-3)
 
 
 @pytest.mark.parametrize("dtype", DTYPES)

@@ -7,7 +7,22 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from helpers import BELOW_COATS, COPPER, FLOOR, LAFORTUNE, REL, STACKS, WOOD, brdf, brdf_rows, cases, close, hemisphere, varnish
+from helpers import (
+    APPROXIMATE,
+    BELOW_COATS,
+    COPPER,
+    FLOOR,
+    LAFORTUNE,
+    REL,
+    STACKS,
+    WOOD,
+    brdf,
+    brdf_rows,
+    cases,
+    close,
+    hemisphere,
+    varnish,
+)
 from layerfit.errors import InputError
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
@@ -177,3 +192,50 @@ def test_a_lobe_that_is_not_whole_is_refused():
         stack_of({"base": {"type": "lafortune", "ks_2": 0.3, "cx_2": -1.0, "exponent_2": 5.0}}, "here")
     with pytest.raises(InputError, match="cy_3 belongs to ks_3"):
         stack_of({"base": {"type": "lafortune", "cy_3": 0.3}}, "here")
+
+
+@pytest.mark.parametrize("name", APPROXIMATE)
+def test_an_approximate_reflectance_prints_and_is_near_the_exact_one(gl, name):
+    stack = APPROXIMATE[name]
+    shader = print_material(stack, "test")
+    parity = check_pairs(shader, 16384)
+    assert parity.passed, parity
+    *layers, base = (
+        dataclasses.replace(x, fresnel="exact") if hasattr(x, "fresnel") else x for x in (*stack.layers, stack.base)
+    )
+    exact = rows(dataclasses.replace(stack, layers=tuple(layers), base=base))
+    assert 0.0 < np.median(np.abs(rows(stack) - exact) / (exact + 1e-3)) < 0.06
+
+
+@pytest.mark.parametrize("fresnel", ["schlick", "lazanyi"])
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_approximations_have_derivatives_where_indices_match(fresnel, dtype):
+    """And a coat of index 1 is no coat."""
+    coat = Stack((Coat(alpha=0.1, eta=1.0, fresnel=fresnel),), Phong(kd=0.3)).astype(dtype)
+    wi, wo = (jnp.asarray(w, dtype) for w in hemisphere(2, 5))
+    value, slope = jax.jvp(lambda s: brdf(s, wi, wo), (coat,), (jax.tree.map(jnp.ones_like, coat),))
+    assert np.all(np.isfinite(slope))
+    np.testing.assert_allclose(value, brdf(Stack((), coat.base), wi, wo), rtol=1e-4)
+
+
+def test_what_is_fitted_once_cannot_be_a_uniform():
+    with pytest.raises(InputError, match=r'base\.fresnel = "lazanyi" is fitted to the index once a material'):
+        print_material(APPROXIMATE["conductor, Lazanyi"], "test", uniforms=True)
+
+
+def test_a_shader_says_how_near_its_reflectance_is():
+    assert (
+        "// base: reflectance after Lazanyi and Szirmay-Kalos 2005, within 0.006 of"
+        in print_material(APPROXIMATE["conductor, Lazanyi"], "test").text()
+    )
+
+
+def test_derived_numbers_are_no_keys_of_a_preset():
+    with pytest.raises(InputError, match="lazanyi_a"):
+        stack_of({"base": {"type": "conductor", "lazanyi_a": 0.3}}, "here")
+
+
+def test_the_tables_of_the_precise_form_are_of_the_exact_reflectance():
+    document = {"model": "precise", "layers": [{"type": "coat", "fresnel": "schlick"}], "base": {"type": "lambert"}}
+    with pytest.raises(InputError, match="coat has the reflectance of schlick"):
+        stack_of(document, "here")

@@ -61,6 +61,16 @@ def choice(*, default: str, others: tuple[str, ...], doc: str) -> Any:
     return static(default=default, choices=(default, *others), doc=doc)
 
 
+def derived(comment: str) -> Any:
+    """Declare a number of a layer that is not given but computed, once a material, from those that are: None until then."""
+    return dataclasses.field(default=None, metadata={"derived": True, "comment": comment})
+
+
+def given(cls: Any) -> tuple[str, ...]:
+    """Names of the fields that a user gives."""
+    return tuple(field.name for field in dataclasses.fields(cls) if not field.metadata.get("derived"))
+
+
 def params(layer: Any) -> Iterator[tuple[str, Param]]:
     """The declared numeric fields of a layer or its class, absent ones included, in order."""
     for field in dataclasses.fields(layer):
@@ -68,7 +78,7 @@ def params(layer: Any) -> Iterator[tuple[str, Param]]:
             yield field.name, field.metadata["param"]
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(param, choice, static))
+@dataclass_transform(frozen_default=True, field_specifiers=(param, choice, derived, static))
 def layer(cls: type[T]) -> type[T]:
     """A struct that a user builds: a list of three numbers is a colour."""
 

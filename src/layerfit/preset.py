@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ._data import shaders
-from ._fields import Param, params
+from ._fields import Param, given, params
 from .documents import check_keys, nearest, read_document, write_text
 from .errors import InputError
 from .forms.corrected import Corrected
@@ -163,7 +163,7 @@ def _layer(document: Any, kinds: Mapping[str, Any], where: str) -> Any:
     if not isinstance(kind, str) or kind not in kinds:
         raise InputError(f"{where}: type = {kind!r} is not one of {', '.join(kinds)}{nearest(str(kind), kinds)}")
     cls = kinds[kind]
-    known = {field.name: field for field in dataclasses.fields(cls)}
+    known = {field.name: field for field in dataclasses.fields(cls) if field.name in given(cls)}
     check_keys(document, ("type", *known, *(("metal",) if cls is Conductor else ())), where)
     document = _named_metal(document, where)
     specs = dict(params(cls))

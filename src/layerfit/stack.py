@@ -33,7 +33,7 @@ class Stack:
     def prepare(self) -> Any:
         """What is computed once per material: the constants of its shader."""
         if not self.layers:
-            return self.base
+            return self.base.below(1.0)
         for kind in IN_TIME:
             if kind.grows(self.layers):
                 return kind.prepare(self.layers, self.base, self.form)

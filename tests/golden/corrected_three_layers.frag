@@ -133,9 +133,8 @@ float lf_transmittance_dielectric(float c, float eta) {
     return eta == 1.0 ? 1.0 : passed;
 }
 
-// Energy that passes a rough interface, from the facet cosine; `gain` is `second_facet`.
-float lf_rough_transmittance(float c, float eta, float gain) {
-    float T = lf_transmittance_dielectric(c, eta);
+// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
+float lf_rough_transmittance(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
@@ -158,14 +157,14 @@ float lf_slope_spread(float c, float eta) {
     return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
 }
 
-// Follow one direction through a rough interface of relative index eta; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, float eta, vec3 w, vec3 air) {
+// Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
+Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c_energy = eta >= 1.0 ? c : w.z;
-    float T = lf_rough_transmittance(c_energy, eta, interface_.gain);
+    float c_energy = coat.eta >= 1.0 ? c : w.z;
+    float T = lf_rough_transmittance(lf_transmittance_dielectric(c_energy, coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
     vec3 below = lf_refract_about_normal(air, interface_.n);
-    return Crossing(below, T, lf_slope_spread(c, eta), interface_.lengthening + grazing, grazing);
+    return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
 // Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
@@ -217,8 +216,8 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
     float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     float f = F * D * V;
-    Crossing i = lf_cross(lf_coat_interface, lf_coat.eta, wi, wi);
-    Crossing o = lf_cross(lf_coat_interface, lf_coat.eta, wo, wo);
+    Crossing i = lf_cross(lf_coat_interface, lf_coat, wi, wi);
+    Crossing o = lf_cross(lf_coat_interface, lf_coat, wo, wo);
     float throughput = i.T * o.T / (lf_coat.eta * lf_coat.eta);
     float straight = 1.0 / max(i.w.z, 1e-14) + 1.0 / max(o.w.z, 1e-14);
     float added = i.lengthening + o.lengthening;
@@ -263,8 +262,8 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     lobe = D * V;
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * directional * F * lobes;
-    Crossing i2 = lf_cross(lf_primer_interface, lf_primer.eta, i.w, wi);
-    Crossing o2 = lf_cross(lf_primer_interface, lf_primer.eta, o.w, wo);
+    Crossing i2 = lf_cross(lf_primer_interface, lf_primer, i.w, wi);
+    Crossing o2 = lf_cross(lf_primer_interface, lf_primer, o.w, wo);
     float throughput2 = i2.T * o2.T / (lf_primer.eta * lf_primer.eta);
     straight = 1.0 / max(i2.w.z, 1e-14) + 1.0 / max(o2.w.z, 1e-14);
     added = i2.lengthening + o2.lengthening;

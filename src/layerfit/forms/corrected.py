@@ -169,23 +169,23 @@ class Crossing:
     """One direction on its way through one rough interface."""
 
     w: Vec3 = member("direction in the medium below")
-    T: Scalar = member("energy that passes")
+    T: Colour = member("energy that passes")
     spread: Scalar = member("width of the refracted directions over that of the facets")
     lengthening: Scalar = member("path beyond that of the refracted direction, in thicknesses")
     drift: Scalar = member("the part of it due to grazing incidence")
 
 
 @chunk
-def cross(interface: Interface, eta: Scalar, w: Vec3, air: Vec3) -> Crossing:
-    """Follow one direction through a rough interface of relative index eta; `air` is the direction above all of them."""
+def cross(interface: Interface, coat: Coat, w: Vec3, air: Vec3) -> Crossing:
+    """Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them."""
     c = facet_cosine(w, interface.tilt)
     # Out of a denser medium the fits do not hold for the energy: there the interface passes light as a smooth one.
-    c_energy = jnp.where(eta >= 1.0, c, w[2])
-    T = rough_transmittance(c_energy, eta, interface.gain)
+    c_energy = jnp.where(coat.eta >= 1.0, c, w[2])
+    T = rough_transmittance(coat.transmittance(c_energy), interface.gain)
     grazing = drift(w, interface.drift, interface.alpha)
     # From air at once, not from layer to layer: going back to index 1 gives the same direction to the last bit.
     below = refract_about_normal(air, interface.n)
-    return Crossing(below, T, slope_spread(c, eta), interface.lengthening + grazing, grazing)
+    return Crossing(below, T, slope_spread(c, coat.eta), interface.lengthening + grazing, grazing)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -217,8 +217,8 @@ def _enter(above: _Below | None, wi: Vec3, wo: Vec3, prepared: Prepared, options
     """Pass the next interface; wi and wo in air."""
     depth = above.depth if above else 0
     coat, interface = prepared.coats[depth], prepared.interfaces[depth]
-    i = cross(interface, coat.eta, above.i.w if above else wi, wi)
-    o = cross(interface, coat.eta, above.o.w if above else wo, wo)
+    i = cross(interface, coat, above.i.w if above else wi, wi)
+    o = cross(interface, coat, above.o.w if above else wo, wo)
     throughput = i.T * o.T / (coat.eta * coat.eta)
     straight = safe_divide(1.0, i.w[2]) + safe_divide(1.0, o.w[2])
     added = i.lengthening + o.lengthening if options.lengthen else 0.0
@@ -393,8 +393,10 @@ def _escape(coats: list[Coat], interfaces: list[Interface], lobes: Colour | None
         return total + jacobian * (1.0 - cone) * tries(_lost(tau, outside)), None
 
     u, weight = _nodes(n.dtype)
-    zero = jnp.zeros(jnp.broadcast_shapes(*(jnp.shape(x) for x in (n, tau, lobes) if x is not None)), n.dtype)
-    return jax.lax.scan(accumulate, zero, (jnp.asarray(u), jnp.asarray(weight)))[0]
+    nodes = jnp.asarray(u), jnp.asarray(weight)
+    # A colour as soon as anything is: a medium above, a lobe.
+    shape = jax.eval_shape(accumulate, jnp.zeros_like(n), (n, n))[0].shape
+    return jax.lax.scan(accumulate, jnp.zeros(shape, n.dtype), nodes)[0]
 
 
 def _lost(tau: Colour | None, cosine: Scalar) -> Any:
@@ -410,7 +412,7 @@ def _passed_up(coats: list[Coat], interfaces: list[Interface], p2: Scalar) -> Co
         cosine2 = 1.0 - p2 / (n_above * n_above)
         w = jnp.stack([safe_sqrt(p2) / n_above, jnp.zeros_like(p2), safe_sqrt(cosine2)])
         c = jnp.where(coat.eta >= 1.0, facet_cosine(w, interface.tilt), w[2])
-        T = jnp.where(cosine2 > 0.0, rough_transmittance(c, coat.eta, interface.gain), 0.0)
+        T = jnp.where(cosine2 > 0.0, rough_transmittance(coat.transmittance(c), interface.gain), 0.0)
         if depth == 0:
             S = T
         else:

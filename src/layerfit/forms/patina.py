@@ -105,7 +105,7 @@ def prepare(layers: tuple[Any, ...], base: Any, form: Any) -> Prepared:
     (layer,) = layers
     return Prepared(
         film=FORMS[type(form)].prepare((layer.film,), base, form),
-        bare=base,
+        bare=base.below(1.0),
         growth=growth_of(layer),
         crust=Crust(**{field.name: getattr(layer, field.name) for field in dataclasses.fields(Crust)}),
         spot=None,

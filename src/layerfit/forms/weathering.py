@@ -141,7 +141,7 @@ def prepare(layers: tuple[Any, ...], base: Any, form: Any) -> Prepared:
     growths = tuple(growth_of(layer) if isinstance(layer, Overgrowth) else None for layer in layers)
     innermost = [step for step in steps if isinstance(step, Pigment)][-1]
     f0 = base.below(innermost.eta).f0
-    return Prepared(steps, growths, base, f0 + (1.0 - f0) * SCHLICK_MEAN, tuple(None for _ in layers))
+    return Prepared(steps, growths, base.below(1.0), f0 + (1.0 - f0) * SCHLICK_MEAN, tuple(None for _ in layers))
 
 
 def _pigment(layer: Deposit | Overgrowth) -> Pigment:

@@ -6,13 +6,13 @@ from typing import Self
 from .._chunk import static
 from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar
-from ..optics.fresnel import fresnel_dielectric, transmittance_dielectric
 from ..optics.microfacet import Distribution, Masking
+from ..surfaces.facet import Clear, Fresnel, fresnel_choice, lazanyi_a, lazanyi_alpha
 from ..surfaces.microfacet import Microfacets, alpha_param
 
 
 @layer
-class Coat(Microfacets):
+class Coat(Clear, Microfacets):
     """A dielectric layer, lacquer or varnish: light is reflected at its rough top and absorbed on its way through.
 
     Its medium is given by `tau`, by `absorption_per_mm` and `thickness_um`, or by none of them (a clear coat).
@@ -39,6 +39,9 @@ class Coat(Microfacets):
     thickness_um: Number = param(default=None, lower=0.1, upper=5e3, scale="log", doc="thickness", unit="um", fitted=False)
     distribution: Distribution = choice(default="ggx", others=("beckmann",), doc="density of the facet normals")
     masking: Masking = choice(default="smith", others=("smith_separable", "vcavity"), doc="how facets hide one another")
+    fresnel: Fresnel = fresnel_choice()
+    lazanyi_a: Number = lazanyi_a()
+    lazanyi_alpha: Number = lazanyi_alpha()
 
     gauges = (("absorption_per_mm", "thickness_um", "absorption and thickness enter only as tau, their product"),)
     """Pairs of fields that an image cannot tell apart, and why."""
@@ -52,11 +55,4 @@ class Coat(Microfacets):
 
     def below(self, n: Scalar) -> Self:
         """The same coat under a medium of index `n`: relative index, medium by its optical depth alone."""
-        return replace(self, eta=self.eta / n, tau=self.optical_depth, absorption_per_mm=None, thickness_um=None)
-
-    def reflectance(self, c: Scalar) -> Scalar:
-        return fresnel_dielectric(c, self.eta)
-
-    def transmittance(self, c: Scalar) -> Scalar:
-        """Part of the light that passes one facet at the cosine `c`."""
-        return transmittance_dielectric(c, self.eta)
+        return replace(self, eta=self.eta / n, tau=self.optical_depth, absorption_per_mm=None, thickness_um=None).fitted()

@@ -69,6 +69,15 @@ def fresnel_schlick(c: Scalar, f0: Colour) -> Colour:
     return f0 + (1.0 - f0) * (m2 * m2 * m)
 
 
+@chunk
+def rarer_cosine(c: Scalar, eta: Colour) -> Colour:
+    """The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.
+
+    Exact reflectance is the same from both sides of one ray. Approximations are made for light from the rarer medium.
+    """
+    return jnp.where(eta >= 1.0, c, safe_sqrt((eta - 1.0) * (eta + 1.0) + c * c) / eta)
+
+
 def dielectric_f0(eta: Colour) -> Colour:
     """Reflectance of a dielectric boundary at normal incidence."""
     ratio = (eta - 1.0) / (eta + 1.0)

@@ -7,8 +7,7 @@ at width 0. `NoW` is the cosine just above the interface, `eta` its relative ind
 import jax.numpy as jnp
 
 from .._chunk import chunk, safe_divide, safe_power, safe_sqrt
-from .._types import Scalar, Vec3
-from .fresnel import transmittance_dielectric
+from .._types import Colour, Scalar, Vec3
 
 
 def facet_tilt(alpha: Scalar) -> Scalar:
@@ -40,9 +39,8 @@ def facet_cosine(w: Vec3, tilt: Scalar) -> Scalar:
 
 
 @chunk
-def rough_transmittance(c: Scalar, eta: Scalar, gain: Scalar) -> Scalar:
-    """Energy that passes a rough interface, from the facet cosine; `gain` is `second_facet`."""
-    T = transmittance_dielectric(c, eta)
+def rough_transmittance(T: Colour, gain: Scalar) -> Colour:
+    """Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`."""
     return T + (1.0 - T) * gain
 
 

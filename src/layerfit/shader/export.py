@@ -14,8 +14,10 @@ from .._chunk import CHUNKS
 from .._data import shaders
 from .._fields import params
 from .._place import TANGENT, Place, needs_tangent
+from ..errors import InputError
 from ..forms import weathering
 from ..forms.precise import BAKED, Precise
+from ..optics.lazanyi import fit_lazanyi
 from ..preset import left_out, model_name
 from ..stack import PREPARED, Stack, at, evaluate
 from .printer import PREFIX, Printer
@@ -71,7 +73,21 @@ class Shader:
         covered = (*self.stack.layers, self.stack.base)[1:]
         if not self.uniforms and any(name == "eta" for layer in covered for name, _ in params(layer)):
             lines += ["Indices of refraction are relative to the layer above: its own index divides those in the preset."]
+        lines += approximations(self.stack)
         return "\n".join(f"// {line}" for line in lines)
+
+
+def approximations(stack: Stack) -> list[str]:
+    """What a shader says of its Fresnel reflectances where they are not exact."""
+    lines, n = [], 1.0
+    for layer in (*stack.layers, stack.base):
+        if getattr(layer, "fresnel", "exact") == "lazanyi":
+            error = float(np.max(fit_lazanyi(layer.eta / n, getattr(layer, "k", 0.0) / n).error))
+            lines.append(
+                f"{layer.name}: reflectance after Lazanyi and Szirmay-Kalos 2005, within {error:.1g} of the exact one."
+            )
+        n = getattr(layer, "eta", n)
+    return lines
 
 
 def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
@@ -86,6 +102,7 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
         return jnp.broadcast_to(evaluate(stack.form, at(prepared, there), wi, wo), (3,))
 
     if uniforms:
+        _check_live(stack)
         rows, leaves = _uniforms(stack), jax.tree.leaves(stack)
         given = [row for row in rows if row]
         declarations = "".join(f"uniform {kind} {name};  // {note}\n" for _, name, kind, note in given)
@@ -117,6 +134,16 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
     frame = template("brdf.glsl", shader.asks)
     functions = "\n".join(part for part in (printer.structs_text(), declarations, printer.functions_text(), frame) if part)
     return dataclasses.replace(shader, functions=functions)
+
+
+def _check_live(stack: Stack) -> None:
+    """Raise `InputError` where a shader could not compute its constants from its uniforms."""
+    for layer in (*stack.layers, stack.base):
+        if getattr(layer, "fresnel", None) == "lazanyi":
+            raise InputError(
+                f'{layer.name}.fresnel = "lazanyi" is fitted to the index once a material, which a shader cannot do from uniforms: '
+                'print the material with constants, or give it fresnel = "schlick" or "exact"'
+            )
 
 
 def _parts(stack: Stack, prepared: Any) -> list[tuple[str, Any]]:

@@ -13,7 +13,8 @@ from ..optics.flakes import flake_tilt, into_facet, kept_tilt, tilted_d, tilted_
 from ..optics.microfacet import Width, density, visibility
 from .base import Lobe, Surface, variance
 from .diffuse import Lambert
-from .microfacet import Metal, alpha_param, metal_eta, metal_k
+from .facet import Metal, metal_eta, metal_k
+from .microfacet import alpha_param
 
 
 @layer

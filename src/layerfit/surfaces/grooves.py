@@ -11,7 +11,8 @@ from .._types import Colour, Number, Scalar, Vec3
 from ..optics.microfacet import Distribution, Masking, Width, v_cavity
 from .base import Lobe, variance
 from .diffuse import TwoParts, kd_param
-from .microfacet import Metal, Microfacets, alpha_param, metal_eta, metal_k
+from .facet import Fresnel, Metal, fresnel_choice, lazanyi_a, lazanyi_alpha, metal_eta, metal_k
+from .microfacet import Microfacets, alpha_param
 
 
 @layer
@@ -32,6 +33,9 @@ class CookTorrance(TwoParts, Metal, Microfacets):
     alpha: Number = alpha_param(default=0.2, which=", the paper's m")
     eta: Number = metal_eta()
     k: Number = metal_k()
+    fresnel: Fresnel = fresnel_choice()
+    lazanyi_a: Number = lazanyi_a()
+    lazanyi_alpha: Number = lazanyi_alpha()
     scaling: Literal["normalized", "faithful"] = choice(
         default="normalized", others=("faithful",), doc="divided by 4, or by pi as published"
     )
@@ -69,6 +73,9 @@ class TorranceSparrow(TwoParts, Metal, Lobe):
     kappa: Number = param(default=7.0, lower=0.5, upper=1e3, scale="log", doc="narrowness of the facet angles", unit="1/rad")
     eta: Number = metal_eta()
     k: Number = metal_k()
+    fresnel: Fresnel = fresnel_choice()
+    lazanyi_a: Number = lazanyi_a()
+    lazanyi_alpha: Number = lazanyi_alpha()
 
     @property
     def lobes(self) -> tuple[Lobe, ...]:

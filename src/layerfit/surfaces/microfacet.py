@@ -6,9 +6,9 @@ from typing import Any, Self
 from .._chunk import static
 from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar, Vec3
-from ..optics.fresnel import conductor_f0, dielectric_f0, fresnel_conductor, fresnel_dielectric
 from ..optics.microfacet import Distribution, Masking, Width, density, half_cosine, half_vector, visibility
 from .base import Lobe, Surface
+from .facet import Clear, Fresnel, Metal, fresnel_choice, lazanyi_a, lazanyi_alpha, metal_eta, metal_k
 
 
 class Microfacets(Surface, Lobe):
@@ -56,39 +56,6 @@ def alpha_param(*, default: float | None, which: str) -> Any:
     return param(default=default, lower=1e-3, upper=1.0, scale="log", doc=doc)
 
 
-def metal_eta() -> Any:
-    """Declare the index of a metal."""
-    doc = "index of refraction, real part"
-    return param(default=0.2, lower=0.02, upper=10.0, scale="log", doc=doc, colour=True, fitted=False)
-
-
-def metal_k() -> Any:
-    """Declare the extinction of a metal."""
-    doc = "index of refraction, imaginary part"
-    return param(default=3.5, lower=0.0, upper=15.0, scale="softlog", doc=doc, colour=True, fitted=False)
-
-
-class Metal(Surface):
-    """A boundary to a complex index of refraction, absolute (against air); a coat above divides it by its own."""
-
-    eta: Number
-    k: Number
-
-    def below(self, n: Scalar) -> Self:
-        """The same metal under a medium of index `n`."""
-        made: Any = self
-        return replace(made, eta=self.eta / n, k=self.k / n)
-
-    def reflectance(self, c: Scalar) -> Colour:
-        """Of one facet."""
-        return fresnel_conductor(c, self.eta, self.k)
-
-    @property
-    def f0(self) -> Colour:
-        """Reflectance of one facet at normal incidence."""
-        return conductor_f0(self.eta, self.k)
-
-
 @layer
 class Conductor(Metal, Microfacets):
     """A rough metal."""
@@ -101,10 +68,13 @@ class Conductor(Metal, Microfacets):
     k: Number = metal_k()
     distribution: Distribution = choice(default="ggx", others=("beckmann",), doc="density of the facet normals")
     masking: Masking = choice(default="smith", others=("smith_separable", "vcavity"), doc="how facets hide one another")
+    fresnel: Fresnel = fresnel_choice()
+    lazanyi_a: Number = lazanyi_a()
+    lazanyi_alpha: Number = lazanyi_alpha()
 
 
 @layer
-class Dielectric(Microfacets):
+class Dielectric(Clear, Microfacets):
     """A rough boundary to a clear or black medium of real index; what passes it is lost."""
 
     name: str = static(default="base", doc="name of the layer")
@@ -114,14 +84,10 @@ class Dielectric(Microfacets):
     eta: Number = param(default=1.5, lower=1.0, upper=4.0, scale="linear", doc="index of refraction", colour=True)
     distribution: Distribution = choice(default="ggx", others=("beckmann",), doc="density of the facet normals")
     masking: Masking = choice(default="smith", others=("smith_separable", "vcavity"), doc="how facets hide one another")
+    fresnel: Fresnel = fresnel_choice()
+    lazanyi_a: Number = lazanyi_a()
+    lazanyi_alpha: Number = lazanyi_alpha()
 
     def below(self, n: Scalar) -> Self:
         """The same medium under one of index `n`."""
-        return replace(self, eta=self.eta / n)
-
-    def reflectance(self, c: Scalar) -> Colour:
-        return fresnel_dielectric(c, self.eta)
-
-    @property
-    def f0(self) -> Colour:
-        return dielectric_f0(self.eta)
+        return replace(self, eta=self.eta / n).fitted()

@@ -102,6 +102,10 @@ def check(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
     for coat in stack.layers:
         if coat.masking == "vcavity":
             raise ValueError(f"coat {coat.name!r} has V-cavities, which say nothing of refracted light: set masking='smith'")
+        if coat.fresnel != "exact":
+            raise ValueError(
+                f"coat {coat.name!r}: the walk knows the exact reflectance, not {coat.fresnel}: set fresnel='exact'"
+            )
         if np.ndim(coat.eta) > 1:
             raise ValueError(f"coat {coat.name!r} has an index for every channel; a path has one direction: walk by channel")
     if not (stack.base.diffuse is stack.base or isinstance(stack.base, (Conductor, Dielectric))):
