@@ -122,7 +122,7 @@ def _index(c: np.ndarray, reflectance: np.ndarray) -> tuple[float, float]:
     r = float(np.clip(reflectance[-1], 1e-4, HIGHEST))
     # The reflectance at the normal leaves one number open (Gulbrandsen 2014): eta, between the two values where k is 0.
     root = r**0.5
-    eta = np.geomspace(max((1.0 - root) / (1.0 + root), ETA[0]), min((1.0 + root) / (1.0 - root), ETA[1]), 4096)
+    eta = np.geomspace(max((1.0 - root) / (1.0 + root), ETA[0]), min((1.0 + root) / (1.0 - root), ETA[1]), 1024)
     k = np.sqrt(np.maximum(r * (eta + 1.0) ** 2 - (eta - 1.0) ** 2, 0.0) / (1.0 - r))
     eta, k = eta[k <= K], k[k <= K]
     misfit = np.sum(c[:, None] * (_reflectance(c, eta, k) - reflectance[:, None]) ** 2, 0)
