@@ -11,7 +11,13 @@ import pytest
 from helpers import COPPER, FLOOR, REL, brdf_rows, cases, close, coat_of, hemisphere, surface_of
 from layerfit._compiled import Compiled
 from layerfit._place import Place
+from layerfit.capture.exr import write_exr
+from layerfit.capture.geometry import sphere_surface
+from layerfit.capture.samples import load_reference
+from layerfit.capture.scene import Camera, Directional, Reference, Sphere
 from layerfit.errors import InputError
+from layerfit.fit.fit import fit
+from layerfit.fit.result import parameters, unidentified
 from layerfit.forms import patina
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
@@ -27,6 +33,7 @@ from layerfit.shader.export import HEADERS, print_material
 from layerfit.shader.verify import check_pairs
 from layerfit.stack import Stack, at, evaluate
 from layerfit.surfaces import Conductor, Lambert
+from layerfit.truth import compare
 
 DTYPES = [np.float64, np.float32]
 
@@ -301,3 +308,47 @@ def test_the_shipped_patina_sends_back_no_more_than_it_gets_at_any_place(years):
             values = predict(stack, wi[:, None], wo, np.ones((8192, 1, 3)), Place(np.broadcast_to(uv, (8192, 2))))
             albedo = 0.98 * 2.0 * np.pi * np.mean(values * wo[:, 2:], 0)
             assert np.all(albedo < 1.0), albedo
+
+
+TRUTH = Stack((Patina(years=9.0, softness=0.08, tau=[0.3, 0.6, 1.2], **CRUST),), METAL)
+
+
+@pytest.fixture(scope="module")
+def sphere(tmp_path_factory):
+    """A sphere of the patina, drawn by the model at 40 x 40 pixels."""
+    camera = Camera((0.8, 0.6, 4.9), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0)
+    covered = sphere_surface(Sphere(), camera, 40, 40).covered
+    path = tmp_path_factory.mktemp("patina") / "sphere.exr"
+    write_exr(path, dict.fromkeys("RGB", np.where(covered, 0.5, 0.0)) | {"A": covered.astype(float)})
+    sun = Directional((0.46175709, 0.55410852, 0.69263564), (np.pi, np.pi, np.pi))
+    view = load_reference(Reference(path, camera, (sun,), Sphere(), {}, None, {}), 0.1)
+    image = predict(TRUTH, *view.samples(np.arange(len(view.index))).arrays)
+    return dataclasses.replace(view, target=image.astype(np.float32))
+
+
+@pytest.fixture(scope="module")
+def fitted(sphere):
+    """Age, edge and crust from a younger start, where the onset is asked for too."""
+    young = dataclasses.replace(TRUTH.layers[0], years=5.0, softness=0.2, scattered=[0.8, 0.8, 0.8])
+    free = [f"patina.{field}" for field in ("years", "onset_years", "softness", "scattered")]
+    return fit([sphere], dataclasses.replace(TRUTH, layers=(young,)), free=free, starts=1)
+
+
+def test_the_age_of_a_patina_is_found(fitted):
+    assert fitted.converged
+    rows = parameters(fitted)
+    assert rows["patina.years"]["value"] == pytest.approx(9.0, rel=2e-3)
+    assert rows["patina.softness"]["value"] == pytest.approx(0.08, rel=5e-3)
+    np.testing.assert_allclose(rows["patina.scattered"]["value"], CRUST["scattered"], rtol=0.02)
+
+
+def test_age_and_onset_are_said_to_be_one(fitted):
+    assert "patina.onset_years" not in parameters(fitted)
+    (row,) = unidentified(fitted)
+    assert row["why"] == "age and onset enter only as their ratio; patina.onset_years was held at its start"
+    assert row["direction"] == {"patina.years": 1.0, "patina.onset_years": 1.0}
+
+
+def test_a_patina_has_no_walk():
+    with pytest.raises(InputError, match="changes in time"):
+        compare(PATINAS["all"], "all")

@@ -20,7 +20,7 @@ from .forms import precise
 from .preset import MODELS, model_name
 from .render import brdf
 from .report import truth as report
-from .stack import Stack
+from .stack import IN_TIME, Stack
 from .walk import Estimate, check, top_lobe, walk
 
 INCIDENCE_DEG = (0.0, 20.0, 40.0, 60.0, 75.0)
@@ -142,6 +142,8 @@ def _check(stack: Stack, name: str, interface: str) -> None:
         raise InputError(f"--interface {interface}: should be single or multi{nearest(interface, ('single', 'multi'))}")
     if not stack.layers:
         raise InputError(f"{name}: there is no coat, so nothing to compare: every form is the base alone, and exact")
+    if any(kind.grows(stack.layers) for kind in IN_TIME):
+        raise InputError(f"{name}: it changes in time, from place to place; the random walk is through coats")
     try:
         check(stack, interface, {})
     except ValueError as error:

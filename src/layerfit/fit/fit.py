@@ -239,11 +239,11 @@ def _without_gauge(start: Stack, free: Sequence[str] | None) -> tuple[Sequence[s
     """Hold one of two fields that enter only together, such as the thickness of a coat whose absorption is fitted too."""
     held = []
     for layer in start.layers:
-        for kept, other, why in getattr(layer, "gauges", ()):
+        for kept, other, sign, why in getattr(layer, "gauges", ()):
             first, second = f"{layer.name}.{kept}", f"{layer.name}.{other}"
             if free is not None and first in free and second in free:
                 free = [name for name in free if name != second]
-                held.append(Held({first: 1.0, second: -1.0}, f"{why}; {second} was held at its start"))
+                held.append(Held({first: 1.0, second: sign}, f"{why}; {second} was held at its start"))
     return free, held
 
 

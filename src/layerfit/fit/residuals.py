@@ -23,9 +23,9 @@ def scaled(stack: Stack, scale: Any) -> Stack:
         return stack
 
     def thicker(coat: Coat, factor: Any) -> Coat:
-        if coat.thickness_um is not None:
+        if getattr(coat, "thickness_um", None) is not None:
             return dataclasses.replace(coat, thickness_um=coat.thickness_um * factor)
-        return coat if coat.tau is None else dataclasses.replace(coat, tau=coat.tau * factor)
+        return coat if getattr(coat, "tau", None) is None else dataclasses.replace(coat, tau=coat.tau * factor)
 
     layers = tuple(thicker(coat, scale[k]) for k, coat in enumerate(stack.layers))
     return dataclasses.replace(stack, layers=layers)

@@ -43,8 +43,8 @@ class Coat(Clear, Microfacets):
     lazanyi_a: Number = lazanyi_a()
     lazanyi_alpha: Number = lazanyi_alpha()
 
-    gauges = (("absorption_per_mm", "thickness_um", "absorption and thickness enter only as tau, their product"),)
-    """Pairs of fields that an image cannot tell apart, and why."""
+    gauges = (("absorption_per_mm", "thickness_um", -1.0, "absorption and thickness enter only as tau, their product"),)
+    """Pairs of fields that an image cannot tell apart: as the first grows, the second with it (1) or against it (-1); and why."""
 
     @property
     def optical_depth(self) -> Colour | None:

@@ -74,8 +74,8 @@ class Patina(Growing):
 
     together = (("albedo", "depth", "g"), ("absorbed", "scattered"))
     """Fields that are given all or not at all."""
-    gauges = (*Coat.gauges, ("years", "onset_years", "age and onset enter only as their ratio"))
-    """Pairs of fields that an image cannot tell apart, and why."""
+    gauges = (*Coat.gauges, ("years", "onset_years", 1.0, "age and onset enter only as their ratio"))
+    """Pairs of fields that an image cannot tell apart: as the first grows, the second with it (1) or against it (-1); and why."""
 
     @property
     def lacks(self) -> list[str]:

@@ -43,8 +43,8 @@ class Overgrowth(Growing):
     alpha: Number = alpha_param(default=0.4, which="")
     eta: Number = _index()
 
-    gauges = (("years", "onset_years", "age and onset enter only as their ratio"),)
-    """Pairs of fields that an image cannot tell apart, and why."""
+    gauges = (("years", "onset_years", 1.0, "age and onset enter only as their ratio"),)
+    """Pairs of fields that an image cannot tell apart: as the first grows, the second with it (1) or against it (-1); and why."""
 
     @property
     def lacks(self) -> list[str]:
