@@ -169,6 +169,8 @@ STACKS: dict[str, Stack] = {
     "car_paint": Stack((), CarPaint(kd=0.05, ks=0.06, ks_2=[0.1, 0.12, 0.13], f0_2=0.8, alpha_2=0.15, scaling="cook_torrance")),
     "flakes": Stack((), Flakes(**COPPER)),
     "corrected over flakes": Stack((varnish(tau=None),), Flakes(coverage=0.6, albedo=[0.02, 0.05, 0.3], **COPPER)),
+    "milky over conductor": Stack((varnish(tau_s=0.5, g=0.6),), Conductor(alpha=0.2, **COPPER)),
+    "milky over lambert": Stack((varnish(tau_s=[0.5, 0.8, 1.2], g=0.6),), Lambert(albedo=[0.5, 0.28, 0.13])),
     "precise over conductor": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Precise()),
     "precise, narrow": Stack((varnish(alpha=0.025),), Conductor(alpha=0.02, **COPPER), Precise()),
     "precise, rough and conserving": Stack((varnish(alpha=0.5, eta=1.7),), Conductor(alpha=0.4, **COPPER), Precise("multi")),

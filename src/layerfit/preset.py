@@ -17,12 +17,13 @@ from ._data import shaders
 from ._fields import Param, given, params
 from .documents import check_keys, nearest, read_document, write_text
 from .errors import InputError
+from .forms import precise
 from .forms.corrected import Corrected
 from .forms.faithful import Faithful
-from .forms.precise import Precise, refuses
+from .forms.precise import Precise
 from .layers import LAYERS
 from .optics.metals import metal
-from .stack import IN_TIME, Stack
+from .stack import FORMS, IN_TIME, Stack
 from .surfaces import BASES, Conductor
 
 SCHEMA = "layerfit/preset"
@@ -132,14 +133,14 @@ def form_of(document: Mapping[str, Any], layers: tuple[Any, ...], base: Any, whe
         if problem := kind.refuses(layers, base):
             raise InputError(f"{where}: {problem}")
     in_time = any(kind.grows(layers) for kind in IN_TIME)
-    reason = "it changes in time" if in_time else refuses(layers, base)
-    model = document.get("model", "corrected" if reason else "precise")
+    model = document.get("model", "corrected" if in_time or precise.refuses(layers, base) else "precise")
     if model not in MODELS:
         raise InputError(f"{where}: model = {model!r} is not one of {', '.join(MODELS)}{nearest(str(model), MODELS)}")
-    if model == "precise" and reason:
-        raise InputError(
-            f'{where}: model = "precise" is not for this material: {reason}. Use "corrected", which is for all of them'
-        )
+    changes = "it changes in time" if model == "precise" else None
+    reason = changes if in_time else FORMS[MODELS[model]].refuses(layers, base)
+    if reason:
+        instead = "" if model == "corrected" else '. Use "corrected", which is for all of them'
+        raise InputError(f'{where}: model = "{model}" is not for this material: {reason}{instead}')
     form = MODELS[model]
     options = dict(document.get("options", {}))
     known = [f.name for f in dataclasses.fields(form) if f.name != "interface"]
@@ -185,6 +186,8 @@ def _layer(document: Any, kinds: Mapping[str, Any], where: str) -> Any:
         raise InputError(
             f"{where}: absorption_per_mm and thickness_um come together; where neither is known give their product tau"
         )
+    if "g" in values and "tau_s" not in values and "tau_s" in specs:
+        raise InputError(f"{where}: g says how a coat scatters, but there is no tau_s, the depth of its scattering")
     if "tau" in values and "absorption_per_mm" in values:
         raise InputError(f"{where}: give either tau, or absorption_per_mm and thickness_um; tau is their product")
     for group in getattr(cls, "together", ()):

@@ -31,13 +31,16 @@ class Stack:
         return jax.tree.map(lambda x: jnp.asarray(x, dtype), self)
 
     def prepare(self) -> Any:
-        """What is computed once per material: the constants of its shader."""
+        """What is computed once per material: the constants of its shader. Raises ValueError for a material that is not of its form."""
         if not self.layers:
             return self.base.below(1.0)
         for kind in IN_TIME:
             if kind.grows(self.layers):
                 return kind.prepare(self.layers, self.base, self.form)
-        return FORMS[type(self.form)].prepare(self.layers, self.base, self.form)
+        form = FORMS[type(self.form)]
+        if reason := form.refuses(self.layers, self.base):
+            raise ValueError(f"the {type(self.form).__name__.lower()} form is not for this material: {reason}")
+        return form.prepare(self.layers, self.base, self.form)
 
     @property
     def reads(self) -> tuple[str, ...]:

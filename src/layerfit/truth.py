@@ -20,8 +20,8 @@ from .forms import precise
 from .preset import MODELS, model_name
 from .render import brdf
 from .report import truth as report
-from .stack import IN_TIME, Stack
-from .walk import Estimate, check, top_lobe, walk
+from .stack import FORMS, IN_TIME, Stack
+from .walk import Estimate, Haze, check, top_lobe, walk
 
 INCIDENCE_DEG = (0.0, 20.0, 40.0, 60.0, 75.0)
 PLANE_DEG = (20.0, 60.0, 75.0)
@@ -144,6 +144,9 @@ def _check(stack: Stack, name: str, interface: str) -> None:
         raise InputError(f"{name}: there is no coat, so nothing to compare: every form is the base alone, and exact")
     if any(kind.grows(stack.layers) for kind in IN_TIME):
         raise InputError(f"{name}: it changes in time, from place to place; the random walk is through coats")
+    coloured = next((coat.name for coat in stack.layers if np.ndim(coat.tau_s)), None)
+    if coloured:
+        raise InputError(f"{name}: {coloured}.tau_s is a colour: the random walk scatters all channels alike; give one number")
     try:
         check(stack, interface, {})
     except ValueError as error:
@@ -152,7 +155,7 @@ def _check(stack: Stack, name: str, interface: str) -> None:
 
 def forms_of(stack: Stack, interface: str) -> dict[str, Any]:
     """Forms for this structure by their names, nearest first; the material's own with its options."""
-    names = [key for key in MODELS if key != "precise" or precise.refuses(stack.layers, stack.base) is None]
+    names = [key for key, form in MODELS.items() if FORMS[form].refuses(stack.layers, stack.base) is None]
     forms: dict[str, Any] = {key: stack.form if key == model_name(stack) else MODELS[key]() for key in names}
     if "precise" in forms:
         forms["precise"] = dataclasses.replace(forms["precise"], interface=interface)
@@ -188,7 +191,13 @@ def _relative(difference: np.ndarray, truth: Estimate, fan: Fan) -> np.ndarray:
 
 
 def _walk(stack: Stack, fan: Fan, paths: int, interface: Any, seed: int) -> Estimate:
-    return walk(stack, fan.wi, fan.wo, paths=paths, seed=seed, interface=interface)
+    return walk(stack, fan.wi, fan.wo, paths=paths, seed=seed, interface=interface, haze=_haze(stack))
+
+
+def _haze(stack: Stack) -> dict[str, Haze]:
+    """The coats that scatter, as the walk knows them."""
+    scatters = [coat for coat in stack.layers if coat.tau_s is not None]
+    return {coat.name: Haze(coat.tau_s, 0.0 if coat.g is None else coat.g) for coat in scatters}
 
 
 def _counts(stack: Stack, fans: Sequence[Fan], interface: str, paths: int | None, seed: int, progress: Progress) -> list[int]:

@@ -9,7 +9,6 @@ import jax
 import numpy as np
 
 from .._compiled import Compiled
-from ..layers import Coat
 from ..render import channels
 from ..stack import Stack
 from .blocks import Block
@@ -22,12 +21,11 @@ def scaled(stack: Stack, scale: Any) -> Stack:
     if scale is None:
         return stack
 
-    def thicker(coat: Coat, factor: Any) -> Coat:
-        if getattr(coat, "thickness_um", None) is not None:
-            return dataclasses.replace(coat, thickness_um=coat.thickness_um * factor)
-        return coat if getattr(coat, "tau", None) is None else dataclasses.replace(coat, tau=coat.tau * factor)
+    def thicker(layer: Any, factor: Any) -> Any:
+        present = [name for name in ("thickness_um", "tau", "tau_s") if getattr(layer, name, None) is not None]
+        return dataclasses.replace(layer, **{name: getattr(layer, name) * factor for name in present})
 
-    layers = tuple(thicker(coat, scale[k]) for k, coat in enumerate(stack.layers))
+    layers = tuple(thicker(layer, scale[k]) for k, layer in enumerate(stack.layers))
     return dataclasses.replace(stack, layers=layers)
 
 

@@ -7,7 +7,8 @@ back down makes a series of ever wider lobes. Holds for any number of coats; wit
 """
 
 import dataclasses
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import add
 from typing import Any
@@ -33,6 +34,7 @@ from ..optics.interface import (
 from ..optics.medium import refract_about_normal, transmittance
 from ..optics.microfacet import Width, half_cosine, half_vector
 from ..surfaces.base import Lobe
+from . import haze
 
 # Share of the path that a rough interface adds which light of a directional lobe takes: fitted, it lies between none and all.
 DIRECTIONAL_SHARE = 0.5
@@ -47,6 +49,7 @@ class Corrected:
 
     `orders`: lobes between base and coat, the last one standing for all that follow; 0 takes the first bounce alone.
     `trapped`: light that total reflection keeps below the coat, as a diffuse term; it counts part of the light that `edge` counts.
+    `multiple`: light that a coat scatters more than once; without it that of Hanrahan and Krueger 1993.
     """
 
     orders: int = 3
@@ -56,6 +59,15 @@ class Corrected:
     steer: bool = True
     edge: bool = True
     trapped: bool = False
+    multiple: bool = True
+
+
+def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
+    """Why a material is not of this form, or None."""
+    for upper, lower in itertools.pairwise(layers):
+        if upper.tau_s is not None:
+            return f"{upper.name} scatters light and lies over {lower.name}: only the innermost coat may scatter"
+    return None
 
 
 @struct
@@ -83,6 +95,8 @@ class Prepared:
     """Part of the light that the lobes of a base send back which has a diffuse part too."""
     trapped: Colour | None
     """Diffuse light of a rough base, kept in by total reflection until it leaves [1/sr]."""
+    haze: haze.Haze | None
+    """What the innermost coat does to light that it scatters."""
 
 
 def _mean_width(width: Width) -> Scalar:
@@ -116,15 +130,17 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Corrected) -> Prepared:
         n = coat.eta
         interfaces.append(_interface(relative[-1], n, options))
     base = base.below(n)
-    returned = lobes = trapped = None
-    if base.diffuse is not None and base.lobes:
+    returned = lobes = trapped = light = None
+    if relative[-1].tau_s is not None and options.multiple:
+        light = _haze(relative, interfaces, base)
+    elif base.diffuse is not None and base.lobes:
         one = jnp.ones_like(n)
         lobes = jnp.minimum(reduce(add, (lobe.energy(lobe.reflectance(one)) for lobe in base.lobes)), 1.0)
-    if base.diffuse is not None:
+    if base.diffuse is not None and light is None:
         returned = 1.0 / jnp.maximum(_left(base.diffuse.albedo, lobes, relative, interfaces), 1e-6)
     if base.lobes and options.trapped:
-        trapped = reduce(add, (trapped_light(lobe, relative[-1].tau, n) for lobe in base.lobes))
-    return Prepared(tuple(relative), tuple(interfaces), base, returned, lobes, trapped)
+        trapped = reduce(add, (trapped_light(lobe, relative[-1].extinction, n) for lobe in base.lobes))
+    return Prepared(tuple(relative), tuple(interfaces), base, returned, lobes, trapped, light)
 
 
 def _left(albedo: Colour, lobes: Colour | None, coats: list[Coat], interfaces: list[Interface]) -> Colour:
@@ -161,6 +177,8 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Corrected) -> Colo
             reflected = reflected * _by_lobes(prepared.lobes, below.R_i, below.i, below.tau)
             reflected = reflected * _by_lobes(prepared.lobes, below.R_o, below.o, below.tau)
         f = f + below.throughput * below.diffuse * reflected
+    if prepared.coats[-1].tau_s is not None:
+        f = f + below.throughput * _scattered(prepared, below, options)
     return jnp.where(lit, f, 0.0)
 
 
@@ -235,14 +253,14 @@ def _enter(above: _Below | None, wi: Vec3, wo: Vec3, prepared: Prepared, options
     return _Below(
         depth=depth + 1,
         n=interface.n,
-        tau=coat.tau,
+        tau=coat.extinction,
         i=i,
         o=o,
         sin_i=sin_i,
         sin_o=sin_o,
         throughput=throughput,
-        directional=_absorbed(coat.tau, straight + DIRECTIONAL_SHARE * added),
-        diffuse=_absorbed(coat.tau, straight + added),
+        directional=_absorbed(coat.extinction, straight + DIRECTIONAL_SHARE * added),
+        diffuse=_absorbed(coat.extinction, straight + added),
         R_i=R_i,
         R_o=R_o,
         spreads=(*spreads, (coat.width, i.spread, o.spread)),
@@ -363,40 +381,78 @@ def _nodes(dtype: np.dtype) -> tuple[np.ndarray, np.ndarray]:
     return (0.5 * (x + 1.0)).astype(dtype), (0.5 * w).astype(dtype)
 
 
-@jax.jit  # not for speed: outside of a trace, a scan over a new function would compile again at every call
+def _scattered(prepared: Prepared, below: _Below, options: Corrected) -> Colour:
+    """Light that the innermost coat scatters."""
+
+    def way(crossing: Crossing, R: Colour) -> haze.Way:
+        path = safe_divide(1.0, crossing.w[2])
+        if options.lengthen:
+            path = path + crossing.lengthening
+        return haze.Way(crossing.w, path, R)
+
+    spread: Any = 0.0
+    for width, spread_i, spread_o in below.spreads if options.broaden else ():
+        both = safe_power(spread_i, haze.POWER) + safe_power(spread_o, haze.POWER)
+        spread = spread + both * haze.width_power(width)
+    i, o = way(below.i, below.R_i), way(below.o, below.R_o)
+    return haze.scattered(prepared.haze, prepared.coats[-1], prepared.base, i, o, spread)
+
+
+# Not for speed: outside of a trace, a scan over a new function would compile again at every call.
+@jax.jit
 def _escape(coats: list[Coat], interfaces: list[Interface], lobes: Colour | None = None) -> Colour:
     """Part of the light of a diffuse base that gets out at its first try: 2 int x mu dmu, x = 1 - R exp(-2 tau / mu).
 
     Of a base with lobes of albedo s too, 2 int x / (1 - s + s x) mu dmu.
     """
+
+    def tries(S: Colour, cosine: Scalar) -> list[Colour]:
+        x = S + (1.0 - S) * _lost(coats[-1].extinction, cosine)
+        return [x if lobes is None else x / jnp.maximum(1.0 - lobes + lobes * x, 1e-6)]
+
+    return _over_directions(tries, coats, interfaces)[0]
+
+
+@jax.jit
+def _haze(coats: list[Coat], interfaces: list[Interface], base: Any) -> haze.Haze:
+    """What the innermost coat does to light that it scatters."""
+
+    def mean(f: Callable[[Colour, Scalar], Sequence[Colour]]) -> Sequence[Colour]:
+        return _over_directions(lambda S, cosine: f(1.0 - S, cosine), coats, interfaces)
+
+    return haze.prepare(coats[-1], base, interfaces[-1].n, mean)
+
+
+def _over_directions(
+    f: Callable[[Colour, Scalar], Sequence[Colour]], coats: list[Coat], interfaces: list[Interface]
+) -> Sequence[Colour]:
+    """2 int f(S, mu) mu dmu over the directions in the innermost medium, mu from 0 to 1; S is what passes up and out."""
     n = interfaces[-1].n
     n_above = interfaces[-2].n if len(interfaces) > 1 else jnp.ones_like(n)
     # Directions are counted by their cosine u^3 in the rarer of the two media: there the integrand is smooth, at any
     # width, and the cube gathers nodes where short paths through a thin medium make it steep.
     rare = jnp.minimum(n, n_above)
     cone = (rare / n) ** 2
-    tau = coats[-1].tau
 
-    def tries(x: Any) -> Any:
-        return x if lobes is None else x / jnp.maximum(1.0 - lobes + lobes * x, 1e-6)
-
-    def accumulate(total: Colour, node: tuple[Scalar, Scalar]) -> tuple[Colour, None]:
-        u, weight = node
+    def at(u: Scalar) -> Sequence[Colour]:
         u2 = u * u
         u3 = u2 * u
-        jacobian = 6.0 * weight * u2 * u3
+        jacobian = 6.0 * u2 * u3
         p2 = (1.0 - u3) * (1.0 + u3) * rare * rare
         S = _passed_up(coats, interfaces, p2)
         cosine = safe_sqrt((rare * u3) ** 2 + (n - rare) * (n + rare)) / n
         outside = u3 * safe_sqrt(1.0 - cone)
-        total = total + jacobian * cone * tries(S + (1.0 - S) * _lost(tau, cosine))
-        return total + jacobian * (1.0 - cone) * tries(_lost(tau, outside)), None
+        within, beyond = f(S, cosine), f(jnp.zeros_like(S), outside)
+        return [jacobian * (cone * w + (1.0 - cone) * b) for w, b in zip(within, beyond, strict=True)]
+
+    def accumulate(total: Sequence[Colour], node: tuple[Scalar, Scalar]) -> tuple[Sequence[Colour], None]:
+        u, weight = node
+        return [t + weight * value for t, value in zip(total, at(u), strict=True)], None
 
     u, weight = _nodes(n.dtype)
-    nodes = jnp.asarray(u), jnp.asarray(weight)
     # A colour as soon as anything is: a medium above, a lobe.
-    shape = jax.eval_shape(accumulate, jnp.zeros_like(n), (n, n))[0].shape
-    return jax.lax.scan(accumulate, jnp.zeros(shape, n.dtype), nodes)[0]
+    zeros = [jnp.zeros(x.shape, x.dtype) for x in jax.eval_shape(at, n)]
+    return jax.lax.scan(accumulate, zeros, (jnp.asarray(u), jnp.asarray(weight)))[0]
 
 
 def _lost(tau: Colour | None, cosine: Scalar) -> Any:
@@ -416,7 +472,7 @@ def _passed_up(coats: list[Coat], interfaces: list[Interface], p2: Scalar) -> Co
         if depth == 0:
             S = T
         else:
-            back = (1.0 - S) * _absorbed(coats[depth - 1].tau, safe_divide(2.0, w[2]))
+            back = (1.0 - S) * _absorbed(coats[depth - 1].extinction, safe_divide(2.0, w[2]))
             S = T * (1.0 - back) / jnp.maximum(1.0 - (1.0 - T) * back, 1e-6)
         n_above = interface.n
     return S

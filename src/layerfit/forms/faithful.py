@@ -30,6 +30,12 @@ class Faithful:
     absorb_at: Literal["n", "h"] = "n"
 
 
+def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
+    """Why a material is not of this form, or None."""
+    scatters = next((layer.name for layer in layers if layer.tau_s is not None), None)
+    return f"{scatters} scatters light, which this form does not know" if scatters else None
+
+
 @struct
 class Prepared:
     """A stack with every index relative to the medium above."""

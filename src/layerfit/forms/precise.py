@@ -82,6 +82,8 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
         return f"{coat.name} is not isotropic GGX"
     if coat.fresnel != "exact":
         return f"{coat.name} has the reflectance of {coat.fresnel}, and the tables were made with the exact one"
+    if coat.tau_s is not None:
+        return f"{coat.name} scatters light"
     if isinstance(base, (Lambert, OrenNayar)):
         return None
     if not isinstance(base, Conductor):

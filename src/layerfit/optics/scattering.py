@@ -71,7 +71,7 @@ def saunderson(R: Colour, k1: Colour, k2: Colour) -> Colour:
 def henyey_greenstein(deflection: Scalar, g: Scalar) -> Scalar:
     """Phase function [1/sr] of mean cosine g (Henyey and Greenstein 1941, eq. 2); `deflection` is 1 - cos of the turn, 0 to 2."""
     # 1 + g^2 - 2 g cos as a sum of two positive terms: near its peak, g -> 1 forwards or -1 backwards, the plain form cancels.
-    a = jnp.abs(g)
+    a = jnp.where(g < 0.0, -g, g)  # not abs, which has no derivative at 0: this has that from above, which is that of the whole
     spread = (1.0 - a) * (1.0 - a) + 2.0 * a * jnp.where(g < 0.0, 2.0 - deflection, deflection)
     return (1.0 - a) * (1.0 + a) / (4.0 * math.pi * (spread * jnp.sqrt(spread)))
 
@@ -79,18 +79,27 @@ def henyey_greenstein(deflection: Scalar, g: Scalar) -> Scalar:
 @chunk
 def scattered_back(phase: Scalar, albedo: Colour, tau: Colour, cos_i: Scalar, cos_o: Scalar) -> Colour:
     """BRDF [1/sr] of light that a slab scatters once, and back, without a boundary (Hanrahan and Krueger 1993)."""
-    cos_i, cos_o = jnp.maximum(cos_i, _GRAZING), jnp.maximum(cos_o, _GRAZING)
-    both = cos_i + cos_o
-    return albedo * phase * -jnp.expm1(-tau * (both / (cos_i * cos_o))) / both
+    return once_back(phase, albedo * tau, tau, 1.0 / jnp.maximum(cos_i, _GRAZING), 1.0 / jnp.maximum(cos_o, _GRAZING))
 
 
 @chunk
 def scattered_through(phase: Scalar, albedo: Colour, tau: Colour, cos_i: Scalar, cos_t: Scalar) -> Colour:
     """BTDF [1/sr] of light that a slab scatters once, and on to the other side, without a boundary (Hanrahan and Krueger 1993)."""
+    return once_through(phase, albedo * tau, tau, 1.0 / jnp.maximum(cos_i, _GRAZING), 1.0 / jnp.maximum(cos_t, _GRAZING))
+
+
+@chunk
+def once_back(phase: Scalar, tau_s: Colour, tau: Colour, path_i: Scalar, path_o: Scalar) -> Colour:
+    """The same by the depth of scattering within `tau`, and paths in thicknesses: 1 / cos, or longer below a rough boundary."""
+    return tau_s * (phase * path_i * path_o) * mean_transmittance(tau * (path_i + path_o))
+
+
+@chunk
+def once_through(phase: Scalar, tau_s: Colour, tau: Colour, path_i: Scalar, path_t: Scalar) -> Colour:
+    """The same for light that goes on to the other side."""
     # (exp(-a) - exp(-b)) / (b - a), the shorter way taken out: it neither cancels at a = b nor overflows.
-    a, b = tau / jnp.maximum(cos_i, _GRAZING), tau / jnp.maximum(cos_t, _GRAZING)
-    mean = jnp.exp(-jnp.minimum(a, b)) * mean_transmittance(jnp.abs(b - a))
-    return albedo * phase * mean * tau / (jnp.maximum(cos_i, _GRAZING) * jnp.maximum(cos_t, _GRAZING))
+    a, b = tau * path_i, tau * path_t
+    return tau_s * (phase * path_i * path_t) * jnp.exp(-jnp.minimum(a, b)) * mean_transmittance(jnp.abs(b - a))
 
 
 @chunk
@@ -98,7 +107,7 @@ def mean_transmittance(x: Colour) -> Colour:
     """(1 - exp(-x)) / x for x >= 0: mean of exp(-x t) over t in [0, 1]."""
     thin = x < 1e-2
     safe = jnp.where(thin, 1.0, x)
-    return jnp.where(thin, 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0)), -jnp.expm1(-safe) / safe)
+    return jnp.where(thin, 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))), -jnp.expm1(-safe) / safe)
 
 
 def unscattered(tau: Colour, cosine: Scalar) -> Colour:
