@@ -13,7 +13,6 @@ from layerfit.errors import InputError
 from layerfit.forms import curves, precise, tables
 from layerfit.forms.precise import Crossing, Precise, refuses
 from layerfit.layers import Coat
-from layerfit.optics.fresnel import transmittance_dielectric
 from layerfit.optics.interface import facet_cosine, facet_tilt, rough_transmittance, second_facet
 from layerfit.preset import preset_of, stack_of
 from layerfit.stack import Stack
@@ -48,7 +47,8 @@ class Linear:
         w, eta = np.array(w), self.eta
         mu, sine = w[2], np.hypot(w[0], w[1])
         closed = rough_transmittance(
-            transmittance_dielectric(facet_cosine(jnp.asarray(w), facet_tilt(jnp.asarray(self.alpha))), jnp.asarray(eta)),
+            facet_cosine(jnp.asarray(w), facet_tilt(jnp.asarray(self.alpha))),
+            jnp.asarray(eta),
             second_facet(jnp.asarray(self.alpha)),
         )
         T = np.clip(float(closed) + self.look("dT", mu), 0.0, 1.0)
@@ -156,7 +156,7 @@ def test_the_baked_curves_are_the_tables(interface):
             found = jax.vmap(lambda w, baked=baked, eta=eta, alpha=alpha: precise.pass_interface(baked, eta, alpha, w))(w)
             closed = jax.vmap(
                 lambda w, eta=eta, alpha=alpha: rough_transmittance(
-                    transmittance_dielectric(facet_cosine(w, facet_tilt(alpha)), eta), second_facet(alpha)
+                    facet_cosine(w, facet_tilt(alpha)), eta, second_facet(alpha)
                 )
             )(w)
             wanted = {

@@ -16,7 +16,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from layerfit.layers import Coat
-from layerfit.optics.fresnel import transmittance_dielectric
 from layerfit.optics.interface import facet_cosine, facet_tilt, rough_transmittance, second_facet
 from layerfit.walk import Interface, scatter
 
@@ -59,7 +58,7 @@ def fitted_transmittance(eta: float, alpha: float, mu: float) -> float:
     """The closed form that `dT` is added to."""
     w = jnp.array([np.sqrt(1.0 - mu * mu), 0.0, mu])
     a, n = jnp.asarray(alpha), jnp.asarray(eta)
-    return float(rough_transmittance(transmittance_dielectric(facet_cosine(w, facet_tilt(a)), n), second_facet(a)))
+    return float(rough_transmittance(facet_cosine(w, facet_tilt(a)), n, second_facet(a)))
 
 
 def from_above(

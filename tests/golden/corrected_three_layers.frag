@@ -134,7 +134,7 @@ float lf_transmittance_dielectric(float c, float eta) {
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
-float lf_rough_transmittance(float T, float gain) {
+float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
@@ -161,7 +161,7 @@ float lf_slope_spread(float c, float eta) {
 Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
     float c_energy = coat.eta >= 1.0 ? c : w.z;
-    float T = lf_rough_transmittance(lf_transmittance_dielectric(c_energy, coat.eta), interface_.gain);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(c_energy, coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
     vec3 below = lf_refract_about_normal(air, interface_.n);
     return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);

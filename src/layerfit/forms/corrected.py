@@ -25,11 +25,11 @@ from ..optics.interface import (
     drift_scale,
     facet_cosine,
     facet_tilt,
-    rough_transmittance,
     second_facet,
     slope_spread,
     spread_lengthening,
     steer,
+    with_second_facet,
 )
 from ..optics.medium import refract_about_normal, transmittance
 from ..optics.microfacet import Width, half_cosine, half_vector
@@ -199,7 +199,7 @@ def cross(interface: Interface, coat: Coat, w: Vec3, air: Vec3) -> Crossing:
     c = facet_cosine(w, interface.tilt)
     # Out of a denser medium the fits do not hold for the energy: there the interface passes light as a smooth one.
     c_energy = jnp.where(coat.eta >= 1.0, c, w[2])
-    T = rough_transmittance(coat.transmittance(c_energy), interface.gain)
+    T = with_second_facet(coat.transmittance(c_energy), interface.gain)
     grazing = drift(w, interface.drift, interface.alpha)
     # From air at once, not from layer to layer: going back to index 1 gives the same direction to the last bit.
     below = refract_about_normal(air, interface.n)
@@ -468,7 +468,7 @@ def _passed_up(coats: list[Coat], interfaces: list[Interface], p2: Scalar) -> Co
         cosine2 = 1.0 - p2 / (n_above * n_above)
         w = jnp.stack([safe_sqrt(p2) / n_above, jnp.zeros_like(p2), safe_sqrt(cosine2)])
         c = jnp.where(coat.eta >= 1.0, facet_cosine(w, interface.tilt), w[2])
-        T = jnp.where(cosine2 > 0.0, rough_transmittance(coat.transmittance(c), interface.gain), 0.0)
+        T = jnp.where(cosine2 > 0.0, with_second_facet(coat.transmittance(c), interface.gain), 0.0)
         if depth == 0:
             S = T
         else:

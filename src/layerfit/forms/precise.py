@@ -17,7 +17,6 @@ import jax.numpy as jnp
 from .._chunk import chunk, member, safe_power, safe_sqrt, struct
 from .._types import Colour, Number, Scalar, Vec3
 from ..layers import Coat
-from ..optics.fresnel import transmittance_dielectric
 from ..optics.interface import facet_cosine, rough_transmittance
 from ..optics.microfacet import half_cosine
 from ..surfaces.diffuse import Lambert, OrenNayar
@@ -191,7 +190,7 @@ def wider(alpha: Scalar, coat_alpha: Scalar) -> Scalar:
 def pass_interface(interface: Interface, eta: Scalar, alpha: Scalar, w: Vec3) -> Crossing:
     """Follow one direction through the coat's rough top."""
     s = grazing(w[2])
-    T = rough_transmittance(transmittance_dielectric(facet_cosine(w, interface.tilt), eta), interface.gain)
+    T = rough_transmittance(facet_cosine(w, interface.tilt), eta, interface.gain)
     T = jnp.clip(T + curve(interface.passed, interface.passed_high, s), 0.0, 1.0)
     bend = curve(interface.bend, interface.bend_high, s) / eta
     sine = safe_sqrt(w[0] * w[0] + w[1] * w[1])

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from .._chunk import chunk, safe_divide, safe_power, safe_sqrt
 from .._types import Colour, Scalar, Vec3
+from .fresnel import transmittance_dielectric
 
 
 def facet_tilt(alpha: Scalar) -> Scalar:
@@ -39,9 +40,14 @@ def facet_cosine(w: Vec3, tilt: Scalar) -> Scalar:
 
 
 @chunk
-def rough_transmittance(T: Colour, gain: Scalar) -> Colour:
+def with_second_facet(T: Colour, gain: Scalar) -> Colour:
     """Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`."""
     return T + (1.0 - T) * gain
+
+
+def rough_transmittance(c: Scalar, eta: Scalar, gain: Scalar) -> Colour:
+    """Energy that passes a rough interface of exact reflectance, from the facet cosine."""
+    return with_second_facet(transmittance_dielectric(c, eta), gain)
 
 
 @chunk
