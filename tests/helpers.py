@@ -37,6 +37,9 @@ from layerfit.surfaces import (
 REL = {np.float64: 1e-12, np.float32: 1e-5}
 FLOOR = {np.float64: 1e-13, np.float32: 1e-6}
 
+# What is evaluated a few times only is compiled quickly rather than well: options for `jax.jit`, 2 to 4 times as quick.
+QUICKLY = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
+
 COPPER = {"eta": [0.201, 0.924, 1.102], "k": [3.913, 2.453, 2.142]}
 
 
