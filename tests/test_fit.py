@@ -24,6 +24,7 @@ from layerfit.surfaces import (
     Blinn,
     Conductor,
     CookTorrance,
+    KubelkaMunk,
     Lafortune,
     Lambert,
     Phong,
@@ -32,6 +33,9 @@ from layerfit.surfaces import (
 
 CAMERA = Camera((0.8, 0.6, 4.9), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0)
 SUN = Directional((0.46175709, 0.55410852, 0.69263564), (np.pi, np.pi, np.pi))
+
+BEHIND = Directional((-0.36, 0.48, -0.8), (np.pi, np.pi, np.pi))
+"""From behind: light that grazes the sphere."""
 
 TRUTH = Stack((Coat(alpha=0.12, eta=1.5, tau=[0.08, 0.25, 0.7]),), Conductor(alpha=0.2, **COPPER))
 START = Stack((Coat(alpha=0.3, eta=1.35, tau=[0.3, 0.3, 0.3]),), Conductor(alpha=0.4, **COPPER))
@@ -44,8 +48,8 @@ def see(tmp_path_factory):
     surface = sphere_surface(Sphere(), CAMERA, 48, 48)
     write_exr(path, dict.fromkeys("RGB", np.where(surface.covered, 0.5, 0.0)) | {"A": surface.covered.astype(float)})
 
-    def make(stack=TRUTH, noise=0.0, lights=(SUN,), scale=None, seed=0):
-        reference = Reference(path, CAMERA, lights, Sphere(), {}, None, {} if scale is None else {"coat": scale})
+    def make(stack=TRUTH, noise=0.0, lights=(SUN,), scale=None, of="coat", seed=0):
+        reference = Reference(path, CAMERA, lights, Sphere(), {}, None, {} if scale is None else {of: scale})
         view = load_reference(reference, 0.1)
         samples = view.samples(np.arange(len(view.index)), 256)
         image = predict(scaled(stack, view.scales(stack)), *samples.arrays)
@@ -131,6 +135,60 @@ def test_a_thickness_cannot_be_told_from_an_absorption(see):
     assert "coat.thickness_um" not in result["parameters"]
     assert any("enter only as tau" in row["why"] for row in result["unidentified"])
     assert "undetermined_direction" in result["flags"]
+
+
+def test_what_a_coat_scatters_is_found(see):
+    truth = Stack((Coat(alpha=0.15, tau=[0.05, 0.15, 0.4], tau_s=[0.5, 0.8, 1.2], g=0.5),), Lambert(albedo=0.2))
+    coat = dataclasses.replace(truth.layers[0], tau=0.2, tau_s=0.3, g=0.1)
+    start = dataclasses.replace(truth, layers=(coat,))
+    free = ["coat.tau", "coat.tau_s", "coat.g"]
+    result = fit([see(truth, lights=(SUN, BEHIND))], start, free=free, starts=1)
+    assert result.converged
+    for field in ("tau", "tau_s", "g"):
+        wanted = getattr(truth.layers[0], field)
+        np.testing.assert_allclose(values(result)[f"coat.{field}"], wanted, rtol=5e-3, err_msg=field)
+
+
+ENAMEL = Stack((Coat(alpha=0.1, eta=1.5),), KubelkaMunk(kx=[0.1, 0.4, 0.9], sx=[1.2, 0.8, 0.4], substrate=0.1))
+PIGMENT = ["base.kx", "base.sx"]
+
+
+def test_one_image_does_not_tell_absorption_from_scattering(see):
+    """Of the pigment it sees an albedo: with the scattering as it is, the absorption is found, and that it was held is said."""
+    start = dataclasses.replace(ENAMEL, base=dataclasses.replace(ENAMEL.base, kx=0.3))
+    result = fit([see(ENAMEL)], start, free=PIGMENT, starts=1)
+    np.testing.assert_allclose(values(result)["base.kx"], ENAMEL.base.kx, rtol=2e-3)
+    (held,) = document(result)["unidentified"]
+    assert held["direction"] == {"base.kx": 1.0, "base.sx": 1.0}
+    assert "albedo alone" in held["why"]
+    assert "base.sx was held at its start" in held["why"]
+
+
+def test_two_thicknesses_of_a_pigment_tell_them_apart(see):
+    start = dataclasses.replace(ENAMEL, base=dataclasses.replace(ENAMEL.base, kx=0.5, sx=0.5))
+    views = [see(ENAMEL), see(ENAMEL, scale=4.0, of="base")]
+    result = fit(views, start, free=PIGMENT, starts=1)
+    assert result.converged
+    for field in ("kx", "sx"):
+        np.testing.assert_allclose(values(result)[f"base.{field}"], getattr(ENAMEL.base, field), rtol=5e-3, err_msg=field)
+    assert not document(result)["unidentified"]
+
+
+def test_a_pigment_that_hides_its_substrate_is_known_by_a_ratio(see):
+    """At any thickness: a direction that the images do not see, named."""
+    deep = Stack((), KubelkaMunk(kx=[8.0, 30.0, 60.0], sx=60.0, substrate=0.5))
+    start = dataclasses.replace(deep, base=dataclasses.replace(deep.base, kx=20.0))
+    result = fit([see(deep), see(deep, scale=2.0, of="base")], start, free=PIGMENT, starts=1)
+    found = values(result)
+    np.testing.assert_allclose(found["base.kx"] / found["base.sx"], np.divide(deep.base.kx, deep.base.sx), rtol=2e-3)
+    blind = document(result)["unidentified"]
+    assert {name for row in blind for name in row["direction"]} == {f"base.{f}[{k}]" for f in ("kx", "sx") for k in range(3)}
+    assert all("base.kx and base.sx can change together" in row["why"] for row in blind)
+
+
+def test_a_thickness_that_a_base_does_not_have_is_refused(see):
+    with pytest.raises(InputError, match="thickness_scale names 'base'; layers with a thickness are coat"):
+        fit([see(scale=2.0, of="base")], START, starts=1)
 
 
 def test_a_series_of_thicknesses_is_fitted_together(see):

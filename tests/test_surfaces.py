@@ -171,7 +171,7 @@ def test_a_published_base_that_gives_more_than_it_gets_is_white_at_most():
 def test_the_precise_form_and_the_walk_refuse_them_and_say_why(base):
     kind = next(name for name, cls in BASES.items() if cls is type(base))
     document = {"model": "precise", "layers": [{"type": "coat"}], "base": {"type": kind}}
-    with pytest.raises(InputError, match=r"base is neither lambert nor oren_nayar nor conductor"):
+    with pytest.raises(InputError, match=r"base is neither diffuse alone .* nor a conductor"):
         stack_of(document, "here")
     del document["model"]
     assert "Corrected" in type(stack_of(document, "here").form).__name__

@@ -4,6 +4,7 @@
   Weathered metal is a Stack of Deposit, Overgrowth, Erosion and Polish, the latest first.
   read_preset and write_preset.
 - Classic bases: Phong, Blinn, Lafortune, TorranceSparrow, CookTorrance. Metallic and car paint: Flakes, CarPaint.
+  Pigment in layers: KubelkaMunk.
 - fit_lazanyi gives a short Fresnel formula of a metal, a Lazanyi.
 - Spectra: metal gives the index of a named Metal, absorption_rgb the Absorption of a coat, both in three channels with their error.
 - References: read_scene gives a Scene, load its View of each reference, from which Samples are drawn; inspect says what an EXR holds.

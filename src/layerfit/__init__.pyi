@@ -41,6 +41,7 @@ from .surfaces import (
     CookTorrance as CookTorrance,
     Dielectric as Dielectric,
     Flakes as Flakes,
+    KubelkaMunk as KubelkaMunk,
     Lafortune as Lafortune,
     Lambert as Lambert,
     OrenNayar as OrenNayar,

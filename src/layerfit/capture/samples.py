@@ -104,8 +104,8 @@ class View:
             )
 
     def scales(self, stack: Stack) -> np.ndarray | None:
-        """Thickness of each coat in this image over that of the material, or None where all are 1."""
-        scale = [self.reference.thickness_scale.get(layer.name, 1.0) for layer in stack.layers]
+        """Thickness of each layer in this image over that of the material, the base last, or None where all are 1."""
+        scale = [self.reference.thickness_scale.get(layer.name, 1.0) for layer in (*stack.layers, stack.base)]
         return None if all(s == 1.0 for s in scale) else np.array(scale, np.float32)
 
     def samples(self, which: np.ndarray | None = None, quadrature: int = QUADRATURE, seed: int = 0) -> Samples:

@@ -16,7 +16,7 @@ from ..render import predict
 from ..stack import Stack
 from .blocks import Block, arrange, channels_first
 from .parameters import Parametrisation, parametrise, with_fixed
-from .residuals import NEAR, initial, parts, scaled, step
+from .residuals import NEAR, depths, initial, parts, scaled, step
 from .result import FitResult, Held, Minimum, Row
 from .solve import NormalLevenbergMarquardt
 from .uncertainty import GROUPS, estimate
@@ -66,7 +66,7 @@ def fit(
 class _Fit:
     def __init__(self, views, start, free, fixed, weights, loss, starts, seed, where, progress):
         start = with_fixed(start, fixed, f"{where}.fixed")
-        free, self.held = _without_gauge(start, free)
+        free, self.held = _without_gauge(start, free, views)
         start, self.free = parametrise(start, free, tuple(fixed), where)
         self.explicit = free is not None
         self.notes: list[str] = []
@@ -235,10 +235,14 @@ def _weighted(block: Block, inverse_sigma: np.ndarray) -> Block:
     return dataclasses.replace(block, inverse_sigma=jax.device_put(inverse_sigma))
 
 
-def _without_gauge(start: Stack, free: Sequence[str] | None) -> tuple[Sequence[str] | None, list[Held]]:
-    """Hold one of two fields that enter only together, such as the thickness of a coat whose absorption is fitted too."""
+def _without_gauge(start: Stack, free: Sequence[str] | None, views: Sequence[View]) -> tuple[Sequence[str] | None, list[Held]]:
+    """Hold one of two fields that enter only together, such as the thickness of a coat whose absorption is fitted too.
+
+    What a base does with light is another matter at another thickness: there the images tell.
+    """
     held = []
-    for layer in start.layers:
+    told = len({view.reference.thickness_scale.get(start.base.name, 1.0) for view in views}) > 1
+    for layer in start.layers if told else (*start.layers, start.base):
         for kept, other, sign, why in getattr(layer, "gauges", ()):
             first, second = f"{layer.name}.{kept}", f"{layer.name}.{other}"
             if free is not None and first in free and second in free:
@@ -269,17 +273,17 @@ def _sectors(samples: Samples, count: int) -> np.ndarray:
 
 
 def _scales(views: Sequence[View], start: Stack) -> np.ndarray | None:
-    names = [layer.name for layer in start.layers]
+    names = [layer.name for layer in start.layers] + ([start.base.name] if depths(start.base) else [])
     for view in views:
         for name in view.reference.thickness_scale:
             if name not in names:
                 raise InputError(
-                    f"{view.reference.exr}: thickness_scale names {name!r}; the coats are {', '.join(names) or 'none'}"
+                    f"{view.reference.exr}: thickness_scale names {name!r}; layers with a thickness are {', '.join(names) or 'none'}"
                 )
     scales = [view.scales(start) for view in views]
     if all(scale is None for scale in scales):
         return None
-    return np.array([np.ones(len(names)) if scale is None else scale for scale in scales])
+    return np.array([np.ones(len(start.layers) + 1) if scale is None else scale for scale in scales])
 
 
 def _space_filling(free: Parametrisation, origin: np.ndarray, count: int, seed: int) -> list[np.ndarray]:

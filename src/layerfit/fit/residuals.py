@@ -16,17 +16,21 @@ from .parameters import Parametrisation
 from .solve import Normal, columns, normal_equations, products
 
 
+def depths(layer: Any) -> list[str]:
+    """Fields of a layer that grow with its thickness; of several layers of pigment, those of the outermost."""
+    return [name for name in ("thickness_um", "tau", "tau_s", "kx", "sx") if getattr(layer, name, None) is not None]
+
+
 def scaled(stack: Stack, scale: Any) -> Stack:
-    """The material with the coats `scale` times as thick."""
+    """The material with its layers `scale` times as thick, the base last."""
     if scale is None:
         return stack
 
     def thicker(layer: Any, factor: Any) -> Any:
-        present = [name for name in ("thickness_um", "tau", "tau_s") if getattr(layer, name, None) is not None]
-        return dataclasses.replace(layer, **{name: getattr(layer, name) * factor for name in present})
+        return dataclasses.replace(layer, **{name: getattr(layer, name) * factor for name in depths(layer)})
 
-    layers = tuple(thicker(layer, scale[k]) for k, layer in enumerate(stack.layers))
-    return dataclasses.replace(stack, layers=layers)
+    *layers, base = (thicker(layer, scale[k]) for k, layer in enumerate((*stack.layers, stack.base)))
+    return dataclasses.replace(stack, layers=tuple(layers), base=base)
 
 
 def _material(start: Stack, free: Parametrisation, fields: list[Any], block: Block) -> Stack:

@@ -6,7 +6,6 @@ measures it, on materials that no constant was fitted to.
 
 from typing import Any
 
-from ..surfaces.diffuse import Lambert, OrenNayar
 from ..surfaces.microfacet import Conductor
 from . import corrected, precise
 
@@ -32,8 +31,6 @@ def against_walk(layers: tuple[Any, ...], base: Any, form: Any) -> dict[str, Any
     kind = "diffuse"
     if isinstance(base, Conductor):
         kind = "narrow" if base.alpha < NARROW else "conductor"
-    elif not isinstance(base, (Lambert, OrenNayar)):
-        return None
     if (name, interface, kind) not in MEASURED:
         return None
     p50, p90 = MEASURED[name, interface, kind]

@@ -19,7 +19,6 @@ from .._types import Colour, Number, Scalar, Vec3
 from ..layers import Coat
 from ..optics.interface import facet_cosine, rough_transmittance
 from ..optics.microfacet import half_cosine
-from ..surfaces.diffuse import Lambert, OrenNayar
 from ..surfaces.microfacet import Conductor
 from .curves import Interface, bake, curve, diffuse_return, grazing, presence
 
@@ -83,10 +82,10 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
         return f"{coat.name} has the reflectance of {coat.fresnel}, and the tables were made with the exact one"
     if coat.tau_s is not None:
         return f"{coat.name} scatters light"
-    if isinstance(base, (Lambert, OrenNayar)):
+    if not base.lobes:
         return None
     if not isinstance(base, Conductor):
-        return f"{base.name} is neither lambert nor oren_nayar nor conductor, the bases that it was made for"
+        return f"{base.name} is neither diffuse alone (lambert, oren_nayar, kubelka_munk) nor a conductor, the bases that it was made for"
     if base.alpha is None or base.distribution != "ggx":
         return f"{base.name} is not isotropic GGX"
     return None

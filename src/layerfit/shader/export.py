@@ -161,7 +161,7 @@ def _parts(stack: Stack, prepared: Any) -> list[tuple[str, Any]]:
                 if item is None:
                     continue
                 parts.append((layer.name if own else f"{layer.name}_{type(item).__name__.lower()}", item))
-        elif isinstance(value, type(stack.base)):
+        elif field.name == "base" or isinstance(value, type(stack.base)):
             parts.append((stack.base.name if field.name == "base" else f"{stack.base.name}_{field.name}", value))
         elif dataclasses.is_dataclass(value):
             coat = stack.layers[0].name

@@ -7,6 +7,7 @@ from .flakes import Flakes as Flakes
 from .grooves import CookTorrance as CookTorrance, TorranceSparrow as TorranceSparrow
 from .lafortune import Lafortune as Lafortune
 from .microfacet import Conductor as Conductor, Dielectric as Dielectric
+from .pigment import KubelkaMunk as KubelkaMunk
 
 BASES = {
     "conductor": Conductor,
@@ -20,5 +21,6 @@ BASES = {
     "cook_torrance": CookTorrance,
     "car_paint": CarPaint,
     "flakes": Flakes,
+    "kubelka_munk": KubelkaMunk,
 }
 """The surfaces by their name in a preset."""

@@ -6,7 +6,7 @@ that has lost it meets the diffuse part.
 
 from functools import reduce
 from operator import add
-from typing import Any, Self
+from typing import Any
 
 from .._types import Colour, Scalar, Vec3
 from ..optics.microfacet import Distribution, Width, half_cosine, half_vector
@@ -54,8 +54,8 @@ class Surface:
         """The lobes; none on a diffuse boundary."""
         return ()
 
-    def below(self, n: Scalar) -> Self:
-        """The same boundary under a medium of index `n`: what has no index does not change."""
+    def below(self, n: Scalar) -> "Surface":
+        """The same boundary under a medium of index `n`, as a shader holds it: what has no index does not change."""
         return self
 
     def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:

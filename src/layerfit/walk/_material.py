@@ -85,7 +85,14 @@ def read(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> Materi
         boundaries.append(Boundary(coat.eta / above, widths(coat), kind, coat.masking == "smith_separable"))
         media.append(Medium(tau, scatter))
         above = coat.eta
-    return Material(tuple(boundaries), tuple(media), tuple(channel.base.below(above) for channel in channels), interface)
+    return Material(tuple(boundaries), tuple(media), tuple(_relative(channel.base, above) for channel in channels), interface)
+
+
+def _relative(base: Any, above: Any) -> Any:
+    """A base of rows under media of indices `above`, row by row: shading functions know no batches."""
+    rows = max(x.shape[0] for x in jax.tree.leaves((base, above)))
+    base, above = jax.tree.map(lambda x: np.broadcast_to(x, rows), (base, above))
+    return jax.vmap(lambda one, n: one.below(n))(base, above)
 
 
 def widths(surface: Microfacets) -> Widths:
@@ -108,7 +115,7 @@ def check(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
             )
         if np.ndim(coat.eta) > 1:
             raise ValueError(f"coat {coat.name!r} has an index for every channel; a path has one direction: walk by channel")
-    if not (stack.base.diffuse is stack.base or isinstance(stack.base, (Conductor, Dielectric))):
+    if stack.base.lobes and not isinstance(stack.base, (Conductor, Dielectric)):
         kind = type(stack.base).__name__
         raise ValueError(
             f"base {stack.base.name!r}: a {kind} is a formula, no facets to walk on; use a conductor or a diffuse base"
