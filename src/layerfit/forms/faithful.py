@@ -23,11 +23,14 @@ class Faithful:
 
     `refract_at`: rays bend at the facet ("h", as Weidlich and Wilkie: facets much larger than the layer is thick) or at the
     surface ("n", not reciprocal). `fresnel_at`: transmittances are taken there. `absorb_at`: so is the path through the medium.
+    `masked`: light that facets hide leaves without loss, the part 1 - G; without it t = T21, as below a smooth lacquer. With both
+    at "n" that is Neumann and Neumann 1989.
     """
 
     refract_at: Literal["h", "n"] = "h"
     fresnel_at: Literal["h", "n"] = "h"
     absorb_at: Literal["n", "h"] = "n"
+    masked: bool = True
 
 
 def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
@@ -89,7 +92,7 @@ def _coat_over(coat: Coat, below: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec
     else:
         T12 = coat.transmittance(wi[2])
         T21 = coat.transmittance(wo[2])
-    t = (1.0 - G) + T21 * G
+    t = (1.0 - G) + T21 * G if options.masked else T21
     rest = T12 * t * _evaluate(below, base, wi_below, wo_below, options)
     if coat.tau is not None:
         at_h = half_cosine(wi_below, wo_below)
