@@ -196,7 +196,10 @@ def _layer(document: Any, kinds: Mapping[str, Any], where: str) -> Any:
     for key, other in getattr(cls, "only_with", {}).items():
         if key in values and other not in values:
             raise InputError(f"{where}: {key} belongs to {other}, which is not there: leave it out or give both")
-    return cls(**values)
+    made = cls(**values)
+    if problem := getattr(made, "film_problem", None):
+        raise InputError(f"{where}: {problem}")
+    return made
 
 
 def _named_metal(document: Mapping[str, Any], where: str) -> Mapping[str, Any]:

@@ -40,6 +40,7 @@ def channels(
 
     None depends on another: what they share is computed once, and the loops of the compiled code run over pixels.
     """
+    stack = stack.in_channels()
     colours = jax.tree.map(lambda value: 0 if jnp.ndim(value) else None, stack)
     return jax.vmap(_channel, in_axes=(colours, None, None, 0, None))(stack, wi, wo, weight, place)
 

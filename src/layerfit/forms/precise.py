@@ -82,6 +82,8 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
         return f"{coat.name} has the reflectance of {coat.fresnel}, and the tables were made with the exact one"
     if coat.tau_s is not None:
         return f"{coat.name} scatters light"
+    if filmed := next((layer.name for layer in (coat, base) if getattr(layer, "has_film", False)), None):
+        return f"{filmed} has a thin film, and the tables were made without"
     if not base.lobes:
         return None
     if not isinstance(base, Conductor):

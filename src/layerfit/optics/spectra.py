@@ -6,6 +6,7 @@ A spectrum that is 1 everywhere is (1, 1, 1): colours are those of a surface or 
 
 import dataclasses
 import functools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ WAVELENGTHS_NM = np.arange(380.0, 781.0, 5.0)
 
 NEEDED_NM = 400.0, 700.0
 """What a measured spectrum has to cover; beyond its ends it is held. Light outside is less than .002 of white."""
+
+DAYLIGHT = Path(__file__).with_name("daylight.csv")
+"""`rgb_weights()` as numbers, by `tools/make_daylight.py`."""
 
 THICKNESSES = 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0
 """Parts of the thickness at which the error of three channels is stated."""
@@ -72,6 +76,12 @@ def rgb_weights(illuminant: str = "D65") -> np.ndarray:
         np.sum(xyz, 0), space.matrix_RGB_to_XYZ @ np.ones(3), transform="Bradford"
     )
     return xyz @ (space.matrix_XYZ_to_RGB @ adapted).T
+
+
+@functools.cache
+def daylight_weights() -> np.ndarray:
+    """`rgb_weights()` (81, 3) without colour-science: for what a material is prepared with."""
+    return np.loadtxt(DAYLIGHT, delimiter=",")[:, 1:]
 
 
 def delta_e(rgb: Any, other: Any) -> np.ndarray:

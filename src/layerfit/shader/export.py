@@ -78,13 +78,17 @@ class Shader:
 
 
 def approximations(stack: Stack) -> list[str]:
-    """What a shader says of its Fresnel reflectances where they are not exact."""
+    """What a shader says of its Fresnel reflectances where they are not those of the index alone."""
     lines, n = [], 1.0
     for layer in (*stack.layers, stack.base):
         if getattr(layer, "fresnel", "exact") == "lazanyi":
             error = float(np.max(fit_lazanyi(layer.eta / n, getattr(layer, "k", 0.0) / n).error))
             lines.append(
                 f"{layer.name}: reflectance after Lazanyi and Szirmay-Kalos 2005, within {error:.1g} of the exact one."
+            )
+        if getattr(layer, "has_film", False):
+            lines.append(
+                f"{layer.name}: under a film of {float(layer.film_nm):g} nm, whose colour in daylight is in its constants."
             )
         n = getattr(layer, "eta", n)
     return lines
@@ -143,6 +147,11 @@ def _check_live(stack: Stack) -> None:
             raise InputError(
                 f'{layer.name}.fresnel = "lazanyi" is fitted to the index once a material, which a shader cannot do from uniforms: '
                 'print the material with constants, or give it fresnel = "schlick" or "exact"'
+            )
+        if getattr(layer, "has_film", False):
+            raise InputError(
+                f"{layer.name}.film_nm: a film is integrated over the spectrum once a material, which a shader cannot do from uniforms: "
+                "print the material with constants"
             )
 
 

@@ -3,12 +3,15 @@
 from dataclasses import replace
 from typing import Any, Self
 
-from .._chunk import static
+import jax.numpy as jnp
+
+from .._chunk import chunk, static
 from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from ..optics.microfacet import Distribution, Masking, Width, density, half_cosine, half_vector, visibility
 from .base import Lobe, Surface
 from .facet import Clear, Fresnel, Metal, fresnel_choice, lazanyi_a, lazanyi_alpha, metal_eta, metal_k
+from .film import Filmed, baked_f0, film_eta, film_nm, film_reflects
 
 
 class Microfacets(Surface, Lobe):
@@ -57,8 +60,8 @@ def alpha_param(*, default: float | None, which: str) -> Any:
 
 
 @layer
-class Conductor(Metal, Microfacets):
-    """A rough metal."""
+class Conductor(Filmed, Metal, Microfacets):
+    """A rough metal, bare or with a thin clear film on it."""
 
     name: str = static(default="base", doc="name of the layer")
     alpha: Number = alpha_param(default=0.2, which="")
@@ -71,6 +74,27 @@ class Conductor(Metal, Microfacets):
     fresnel: Fresnel = fresnel_choice()
     lazanyi_a: Number = lazanyi_a()
     lazanyi_alpha: Number = lazanyi_alpha()
+    film_nm: Number = film_nm()
+    film_eta: Number = film_eta()
+
+    def below(self, n: Scalar) -> Self:
+        """The same metal under a medium of index `n`; with a film, what is baked of both stands for the metal."""
+        if not self.has_film:
+            return super().below(n)
+        return replace(self, eta=None, k=None, **self.bake_film(n, self.eta / n, self.k / n))
+
+    def reflectance(self, c: Scalar) -> Colour:
+        return super().reflectance(c) if self.film_0 is None else film_reflects(c, film_on_metal(self, c))
+
+    @property
+    def f0(self) -> Colour:
+        return super().f0 if self.film_0 is None else self.reflectance(jnp.ones(()))
+
+
+@chunk
+def film_on_metal(base: Conductor, c: Scalar) -> Colour:
+    """What Schlick's formula takes for f0 of a metal with a film, in daylight."""
+    return baked_f0(base, c)
 
 
 @layer

@@ -113,12 +113,20 @@ def check(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
             raise ValueError(
                 f"coat {coat.name!r}: the walk knows the exact reflectance, not {coat.fresnel}: set fresnel='exact'"
             )
+        if coat.has_film:
+            raise ValueError(
+                f"coat {coat.name!r} has a thin film, which the walk does not know: set film_nm and film_eta to None"
+            )
         if np.ndim(coat.eta) > 1:
             raise ValueError(f"coat {coat.name!r} has an index for every channel; a path has one direction: walk by channel")
     if stack.base.lobes and not isinstance(stack.base, (Conductor, Dielectric)):
         kind = type(stack.base).__name__
         raise ValueError(
             f"base {stack.base.name!r}: a {kind} is a formula, no facets to walk on; use a conductor or a diffuse base"
+        )
+    if getattr(stack.base, "has_film", False):
+        raise ValueError(
+            f"base {stack.base.name!r} has a thin film, which the walk does not know: set film_nm and film_eta to None"
         )
     if np.any(stack.layers[0].eta == 1.0):
         raise ValueError(
