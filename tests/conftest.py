@@ -1,5 +1,6 @@
 """What every test shares: double precision, shape checks, the GL context, and the folders of data outside the repository."""
 
+import gc
 import importlib.util
 import os
 from collections.abc import Iterator
@@ -24,6 +25,20 @@ if importlib.util.find_spec("beartype"):
     jaxtyping.install_import_hook(["layerfit.optics"], "beartype.beartype")
     # The checks wrap every function; without this the printer would take their lines for the user's and name values after them.
     source_info_util.register_exclusion(os.path.dirname(jaxtyping.__file__))
+
+
+MOST_MEMORY = 2.0e9
+"""Bytes of this process above which what JAX keeps compiled is thrown away: a whole run would keep six times as much."""
+
+
+@pytest.fixture(autouse=True)
+def _memory() -> Iterator[None]:
+    yield
+    if Path("/proc/self/statm").exists():
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        if pages * os.sysconf("SC_PAGE_SIZE") > MOST_MEMORY:
+            jax.clear_caches()
+            gc.collect()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -52,7 +52,9 @@ def field_of(x, y, seed):
 
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize(
-    ("name", "formula"), [("fbm", field_of), ("patina_mask", mask_of), ("patina_thickness", thickness_of)], ids=lambda v: str(v)
+    ("name", "formula"),
+    [("fbm", field_of), ("patina_mask", mask_of), ("patina_thickness", thickness_of)],
+    ids=["fbm", "mask", "thickness"],
 )
 def test_growth_has_its_digits(oracle, name, formula, dtype):
     rows = cases(oracle)[name]
