@@ -98,7 +98,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--side", type=int, default=128)
-    parser.add_argument("--model", default="corrected", help="model of the material that is fitted")
+    parser.add_argument("--model", default="precise", help="model of the material that is fitted")
     parser.add_argument("--scene", type=Path, help="another scene, in place of the one that is rendered here")
     arguments = parser.parse_args()
     seconds: dict[str, list[float]] = {name: [] for name in (FIT, AGAIN, PEER)}

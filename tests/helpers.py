@@ -178,6 +178,7 @@ STACKS: dict[str, Stack] = {
     "milky over lambert": Stack((varnish(tau_s=[0.5, 0.8, 1.2], g=0.6),), Lambert(albedo=[0.5, 0.28, 0.13])),
     "precise over conductor": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Precise()),
     "precise, narrow": Stack((varnish(alpha=0.025),), Conductor(alpha=0.02, **COPPER), Precise()),
+    "precise, Beckmann": Stack((varnish(distribution="beckmann"),), Conductor(alpha=0.2, **COPPER), Precise()),
     "precise, rough and conserving": Stack((varnish(alpha=0.5, eta=1.7),), Conductor(alpha=0.4, **COPPER), Precise("multi")),
     "precise, clear coat": Stack((varnish(tau=None),), Conductor(alpha=0.2, **COPPER), Precise()),
     "precise over lambert": Stack((varnish(),), Lambert(albedo=[0.5, 0.28, 0.13]), Precise()),

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from layerfit.fit.residuals import initial
-from layerfit.fit.solve import NormalLevenbergMarquardt, columns, normal_equations, products
+from layerfit.fit.solve import NormalLevenbergMarquardt, columns, normal_equations, products, tangents
 from layerfit.fit.uncertainty import estimate
 
 SLOTS = ((0,), (1, 2, 3), (4,))
@@ -36,9 +36,14 @@ def residual(f, target=TARGET):
     return model(f) - target
 
 
+def derivatives(residual, fields):
+    """Columns of a problem whose material is its fields."""
+    return columns(residual, *tangents(lambda f: f, fields))
+
+
 @partial(jax.jit, static_argnames="residual")
 def jacobian(u, target, residual):
-    return columns(lambda f: residual(f, target), fields(u))
+    return derivatives(lambda f: residual(f, target), fields(u))
 
 
 @jax.jit
@@ -64,7 +69,7 @@ def test_normal_equations_are_those_of_the_dense_jacobian():
     u = jnp.array([0.6, 0.4, 0.9, 1.5, 0.5])
     r = np.asarray(residual(fields(u))).ravel()
     dense = np.asarray(jax.jacfwd(lambda u: residual(fields(u)).ravel())(u))
-    loss, (gradient, gram) = normal_equations(products(columns(residual, fields(u))), SLOTS)
+    loss, (gradient, gram) = normal_equations(products(derivatives(residual, fields(u))), SLOTS)
     np.testing.assert_allclose(loss, 0.5 * r @ r, rtol=1e-13)
     np.testing.assert_allclose(gradient, dense.T @ r, rtol=1e-12)
     np.testing.assert_allclose(gram, dense.T @ dense, rtol=1e-12, atol=1e-12)
@@ -73,9 +78,9 @@ def test_normal_equations_are_those_of_the_dense_jacobian():
 def test_sums_of_float32_residuals_are_float64():
     u = jnp.array([0.6, 0.4, 0.9, 1.5, 0.5])
     narrow = [f.astype(np.float32) for f in fields(u)]
-    sums = products(columns(lambda f: residual(f).astype(np.float32), narrow))
+    sums = products(derivatives(lambda f: residual(f).astype(np.float32), narrow))
     assert sums.dtype == np.float64
-    np.testing.assert_allclose(sums, products(columns(residual, fields(u))), rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(sums, products(derivatives(residual, fields(u))), rtol=1e-5, atol=1e-5)
 
 
 @pytest.mark.parametrize("start", [[0.3, 1.0, 1.0, 1.0, 1.0], [2.0, 0.1, 0.1, 0.1, 0.01]])

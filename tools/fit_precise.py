@@ -1,17 +1,16 @@
 """Fit the constants of the precise form to the random walk.
 
-    python tools/fit_precise.py make ROWS.npz [--count 600] [--paths 30000] [--seed 1]
+    python tools/fit_precise.py make ROWS.npz [--count 600] [--paths 30000] [--seed 1] [--facets beckmann]
     python tools/fit_precise.py fit ROWS.npz [ROWS.npz ...]
     python tools/fit_precise.py check ROWS.npz [ROWS.npz ...]
 
 `make` walks through random materials (GGX coat .03 to .6 wide, index 1.25 to 2.2, optical depth 0 to 2, over a conductor .05 to .8 wide or
-a Lambert base) at random angles; `fit` prints constants for `layerfit/forms/precise.py`; `check` prints how near the form is: per row the
+a Lambert base) at random angles; `fit` prints the constants of the form; `check` prints how near it is: per row the
 sum of |f - truth| cos over that of truth cos, light from below the coat only, as median and 90th percentile over the rows.
 """
 
 import argparse
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import jax
@@ -19,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
-from layerfit.forms import curves, precise
+from layerfit.forms import bounces, curves, precise
 from layerfit.layers import Coat
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Lambert
@@ -29,7 +28,7 @@ VIEWS = 6
 NARROW = 0.2
 
 
-def make(path: Path, count: int, paths: int, seed: int) -> None:
+def make(path: Path, count: int, paths: int, seed: int, facets: str) -> None:
     """Half of the rows for each interface; three of four over a conductor."""
     rng = np.random.default_rng(seed)
     log = lambda low, high, n: np.exp(rng.uniform(np.log(low), np.log(high), n))  # noqa: E731
@@ -52,18 +51,24 @@ def make(path: Path, count: int, paths: int, seed: int) -> None:
             wo[:, : VIEWS // 2] = near / np.linalg.norm(near, axis=-1, keepdims=True)
             flat = lambda table: {key: value.repeat(VIEWS) for key, value in table.items()}  # noqa: E731
             surface = Lambert if kind == "lambert" else Conductor
-            stack = Stack((Coat(**flat(coat), masking="smith_separable"),), surface(**flat(base)))
+            stack = Stack((Coat(**flat(coat), masking="smith_separable", distribution=facets),), surface(**flat(base)))
             found = walk_rows(stack, wi.reshape(-1, 3), wo.reshape(-1, 3), paths=paths, seed=seed, interface=interface)
             name = f"{interface}_{kind}"
             columns = coat | {f"base_{key}": value for key, value in base.items()} | {"wi": wi[:, 0], "wo": wo}
             saved |= {f"{name}_{key}": value for key, value in columns.items()}
             saved |= {f"{name}_f": found.mean.mean(-1).reshape(n, VIEWS), f"{name}_se": found.se.mean(-1).reshape(n, VIEWS)}
-    np.savez_compressed(path, **saved)
+    np.savez_compressed(path, facets=facets, **saved)
 
 
 def _directions(rng: np.random.Generator, theta: np.ndarray) -> np.ndarray:
     phi = rng.uniform(0.0, 2.0 * np.pi, theta.shape)
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+
+
+def facets_of(paths: list[Path]) -> str:
+    """Distribution of the facets of the coats, of all files the same."""
+    (found,) = {str(np.load(path).get("facets", "ggx")) for path in paths}
+    return found
 
 
 def rows(paths: list[Path], interface: str, kind: str) -> dict[str, np.ndarray]:
@@ -74,17 +79,17 @@ def rows(paths: list[Path], interface: str, kind: str) -> dict[str, np.ndarray]:
     return {key: np.concatenate([file[prefix + key] for file in files]).astype(np.float32) for key in keys}
 
 
-def form(row: dict[str, Any], interface: str, kind: str) -> Any:
+def form(row: dict[str, Any], interface: str, kind: str, facets: str = "ggx") -> Any:
     """Light from below the coat, (rows, views)."""
     base = {key.removeprefix("base_"): value for key, value in row.items() if key.startswith("base_")}
-    coat = Coat(alpha=row["alpha"], eta=row["eta"], tau=row["tau"])
+    coat = Coat(alpha=row["alpha"], eta=row["eta"], tau=row["tau"], distribution=facets)
 
     def one(coat: Coat, base: Any, wi: Any, wo: Any) -> Any:
         p = precise.prepare((coat,), base, precise.Precise(interface))
 
         def pair(wo: Any) -> Any:
-            i, o = (precise.pass_interface(p.interface, p.coat.eta, p.coat.alpha, w) for w in (wi, wo))
-            return precise.below(i, o, p.coat, p.base, p.returned)
+            i, o = (precise.pass_interface(p.interface, p.coat.eta, precise.crossed(p.coat), w) for w in (wi, wo))
+            return precise.below(i, o, p)
 
         return jax.vmap(pair)(wo)
 
@@ -101,7 +106,7 @@ def check(paths: list[Path]) -> None:
     for interface in ("single", "multi"):
         for kind in ("lambert", "conductor"):
             row = rows(paths, interface, kind)
-            errors = error(np.asarray(jax.jit(form, static_argnums=(1, 2))(row, interface, kind)), row)
+            errors = error(np.asarray(jax.jit(form, static_argnums=(1, 2, 3))(row, interface, kind, facets_of(paths))), row)
             noise = np.median(np.sum(row["se"] * row["wo"][..., 2], -1) / np.sum(row["f"] * row["wo"][..., 2], -1))
             parts = {"all": errors}
             if kind == "conductor":
@@ -113,16 +118,25 @@ def check(paths: list[Path]) -> None:
                 )
 
 
-NAMES = ("P", "WIDTH", "CONDENSE", "RISE", "RATIO", "TAIL")
+CONSTANTS = {
+    "P": (curves, precise, bounces),
+    "WIDTH": (curves,),
+    "STEER": (curves,),
+    "AGAIN": (bounces,),
+    "CONDENSE": (precise,),
+    "RISE": (precise,),
+    "RATIO": (precise,),
+    "TAIL": (precise,),
+}
+"""By name, with the modules that read them."""
 
 
 def fit(paths: list[Path]) -> None:
     """Levenberg-Marquardt on a smooth form of the error, constants scaled by their present values."""
-    start = {name: getattr(precise, name) for name in NAMES} | {"STEER": curves.STEER}
+    start = {name: getattr(modules[0], name) for name, modules in CONSTANTS.items()}
     start |= {f"DIRECT{k}": v for k, v in enumerate(precise.DIRECT)} | {
         f"DIRECT_PATH{k}": v for k, v in enumerate(precise.DIRECT_PATH)
     }
-    start |= {f"BOUNCES.{key}": value for key, value in vars(precise.BOUNCES).items()}
     names, origin = list(start), np.array(list(start.values()))
     _loosen()
     sets = [(i, rows(paths, i, "conductor")) for i in ("single", "multi")]
@@ -136,7 +150,10 @@ def fit(paths: list[Path]) -> None:
             parts.append(r.ravel())
         return jnp.concatenate(parts) * VIEWS
 
-    value, jacobian = jax.jit(residual), jax.jit(jax.jacfwd(residual))
+    value = jax.jit(residual)
+    column = jax.jit(lambda x, along: jax.jvp(residual, (x,), (along,))[1])
+    # A column at a time: all at once take more memory than there is.
+    jacobian = lambda x: np.stack([np.asarray(column(x, along)) for along in np.eye(len(names), dtype=np.float32)], 1)  # noqa: E731
     found = least_squares(
         lambda x: np.asarray(value(jnp.asarray(x, jnp.float32)), float),
         np.ones(len(names)),
@@ -153,19 +170,19 @@ def fit(paths: list[Path]) -> None:
 
 def _loosen() -> None:
     """Let constants be traced: functions without their caches, powers with any exponent."""
-    for name, value in vars(precise).items():
-        if hasattr(value, "__wrapped__") and hasattr(value, "lower"):
-            setattr(precise, name, value.__wrapped__)
-    precise.safe_power = lambda x, exponent: jnp.power(jnp.maximum(x, 1e-30), exponent)
+    for module in (precise, bounces, curves):
+        for name, value in vars(module).items():
+            if hasattr(value, "__wrapped__") and hasattr(value, "lower"):
+                setattr(module, name, value.__wrapped__)
+        module.safe_power = lambda x, exponent: jnp.power(jnp.maximum(x, 1e-30), exponent)
 
 
 def _set(values: dict[str, Any]) -> None:
-    for name in NAMES:
-        setattr(precise, name, values[name])
-    curves.STEER = values["STEER"]
+    for name, modules in CONSTANTS.items():
+        for module in modules:
+            setattr(module, name, values[name])
     for name in ("DIRECT", "DIRECT_PATH"):
         setattr(precise, name, tuple(values[f"{name}{k}"] for k in range(3)))
-    precise.BOUNCES = SimpleNamespace(**{key[8:]: value for key, value in values.items() if key.startswith("BOUNCES.")})
 
 
 def main() -> None:
@@ -175,9 +192,10 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=600)
     parser.add_argument("--paths", type=int, default=30000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--facets", choices=("ggx", "beckmann"), default="ggx", help="of the coat")
     arguments = parser.parse_args()
     if arguments.command == "make":
-        make(arguments.rows[0], arguments.count, arguments.paths, arguments.seed)
+        make(arguments.rows[0], arguments.count, arguments.paths, arguments.seed, arguments.facets)
     else:
         (fit if arguments.command == "fit" else check)(arguments.rows)
 

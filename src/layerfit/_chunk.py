@@ -14,6 +14,7 @@ from typing import Any, TypeVar, cast, dataclass_transform
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import lax
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., Any])
@@ -55,6 +56,23 @@ def dot(a: jax.Array, b: jax.Array) -> jax.Array:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def where(condition: Any, x: Any, y: Any) -> jax.Array:
+    """`jnp.where`, but no function of its own: compiled code keeps calls, and one for each choice costs more than the choice."""
+    shape = jnp.broadcast_shapes(jnp.shape(condition), jnp.shape(x), jnp.shape(y))
+    dtype = jnp.result_type(x, y)
+
+    def full(value: Any, dtype: Any) -> jax.Array:
+        value = jnp.asarray(value, dtype)
+        return lax.broadcast_in_dim(value, shape, range(len(shape) - value.ndim, len(shape)))
+
+    return lax.select(full(condition, bool), full(x, dtype), full(y, dtype))
+
+
+def clip(x: jax.Array, lower: Any, upper: Any) -> jax.Array:
+    """`jnp.clip`, likewise."""
+    return jnp.minimum(jnp.maximum(x, lower), upper)
+
+
 def _tiny(x: jax.Array) -> float:
     """The smallest number whose reciprocal square root is still harmless in the precision of `x`."""
     return 1e-14 if x.dtype == np.float32 else 1e-30
@@ -71,7 +89,7 @@ def _(primals: Any, tangents: Any) -> Any:
     (x,), (dx,) = primals, tangents
     root = safe_sqrt(x)
     inside = x > _tiny(x)
-    return root, jnp.where(inside, 0.5 / jnp.where(inside, root, 1.0), 0.0) * dx
+    return root, where(inside, 0.5 / where(inside, root, 1.0), 0.0) * dx
 
 
 @jax.custom_jvp
@@ -85,8 +103,8 @@ def _(primals: Any, tangents: Any) -> Any:
     (x, y), (dx, dy) = primals, tangents
     inside = y > _tiny(y)
     quotient = safe_divide(x, y)
-    inverse = 1.0 / jnp.where(inside, y, 1.0)
-    return quotient, jnp.where(inside, (dx - quotient * dy) * inverse, 0.0)
+    inverse = 1.0 / where(inside, y, 1.0)
+    return quotient, where(inside, (dx - quotient * dy) * inverse, 0.0)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1,))
@@ -101,4 +119,4 @@ def _(exponent: float, primals: Any, tangents: Any) -> Any:
     y = safe_power(x, exponent)
     inside = x > 1e-30
     # From the power itself, not by another one: powers are what a step of a fit takes longest for.
-    return y, jnp.where(inside, exponent * y / jnp.where(inside, x, 1.0), 0.0) * dx
+    return y, where(inside, exponent * y / where(inside, x, 1.0), 0.0) * dx

@@ -1,8 +1,9 @@
-"""Functions compiled ahead of their calls, with the seconds that went into it."""
+"""Functions compiled ahead of their calls, side by side, with the seconds that went into it."""
 
 import dataclasses
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 import jax
@@ -10,7 +11,7 @@ import jax
 
 @dataclasses.dataclass
 class Clock:
-    """Seconds that this process has spent tracing and compiling, apart from running."""
+    """Seconds that this process has spent tracing, and waiting for compilers, apart from running."""
 
     trace_s: float = 0.0
     compile_s: float = 0.0
@@ -21,26 +22,41 @@ class Clock:
 
 CLOCK = Clock()
 
-OPTIONS: Any = {"xla_disable_hlo_passes": "call-inliner"}
+OPTIONS: Any = {"xla_disable_hlo_passes": "call-inliner", "xla_cpu_use_fusion_emitters": False}
 """Shading functions stay functions: inlined, they are fused to loops of a thousand operations, which LLVM no longer vectorises (two
 to four times slower)."""
+
+_POOL = ThreadPoolExecutor(2, "compile")
 
 
 class Compiled:
     """A traced function with one executable for each structure and size of its arguments, made when it is first called."""
 
-    def __init__(self, fn: Callable[..., Any], static: tuple[str, ...] = ()):
+    def __init__(self, fn: Callable[..., Any], static: tuple[str, ...] = (), optimise: bool = True):
+        """`optimise=False` for what takes longer to compile than it ever runs."""
         self._jit = jax.jit(fn, static_argnames=static)
-        self._executables: dict[Any, Any] = {}
+        self._options = OPTIONS if optimise else OPTIONS | {"xla_backend_optimization_level": 0}
+        self._executables: dict[Any, tuple[Future[Any], Any]] = {}
+
+    def begin(self, *args: Any, **static: Any) -> Any:
+        """Trace a call and have it compiled while other work goes on. Arguments and result are arrays or their shapes."""
+        return self._entry(args, static)[1]
 
     def __call__(self, *args: Any, **static: Any) -> Any:
+        executable = self._entry(args, static)[0]
+        if not executable.done():
+            start = time.perf_counter()
+            executable.result()
+            CLOCK.compile_s += time.perf_counter() - start
+        return executable.result()(*args)
+
+    def _entry(self, args: Any, static: dict[str, Any]) -> tuple[Future[Any], Any]:
         leaves, structure = jax.tree.flatten(args)
         key = (structure, tuple((a.shape, a.dtype) for a in leaves), tuple(static.values()))
         if key not in self._executables:
             start = time.perf_counter()
-            lowered = self._jit.trace(*args, **static).lower()
-            traced = time.perf_counter()
-            self._executables[key] = lowered.compile(compiler_options=OPTIONS)
-            CLOCK.trace_s += traced - start
-            CLOCK.compile_s += time.perf_counter() - traced
-        return self._executables[key](*args)
+            traced = self._jit.trace(*args, **static)
+            lowered = traced.lower()
+            CLOCK.trace_s += time.perf_counter() - start
+            self._executables[key] = _POOL.submit(lowered.compile, compiler_options=self._options), traced.out_info
+        return self._executables[key]

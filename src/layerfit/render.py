@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from ._compiled import Compiled
 from ._place import Place, narrowed
-from .stack import Stack, at, evaluate
+from .stack import Stack, at, evaluate, prepared
 
 
 def radiance(
@@ -36,24 +36,24 @@ def channels(
     weight: Float[Array, "3 n s"],
     place: Place | None = None,
 ) -> Float[Array, "3 n"]:
-    """`radiance` with the channels first, in and out.
+    """`radiance` with the channels first, in and out."""
+    return shade(stack.prepare(), wi, wo, weight, place, form=stack.form)
 
-    None depends on another: what they share is computed once, and the loops of the compiled code run over pixels.
+
+def shade(prepared: Any, wi: Any, wo: Any, weight: Any, place: Any = None, *, form: Any) -> Float[Array, "3 n"]:
+    """`channels` of a prepared material.
+
+    No channel depends on another: what they share is computed once, and the loops of the compiled code run over pixels.
     """
-    stack = stack.in_channels()
-    colours = jax.tree.map(lambda value: 0 if jnp.ndim(value) else None, stack)
-    return jax.vmap(_channel, in_axes=(colours, None, None, 0, None))(stack, wi, wo, weight, place)
+    colours = jax.tree.map(lambda value: 0 if jnp.shape(value) == (3,) else None, prepared)
+
+    def channel(prepared: Any, weight: Any) -> Any:
+        return jax.vmap(lambda *pixel: _pixel(form, prepared, *pixel))(wi, wo, weight, place)
+
+    return jax.vmap(channel, in_axes=(colours, 0))(prepared, weight)
 
 
-def _channel(stack: Stack, wi: Any, wo: Any, weight: Any, place: Any) -> Any:
-    prepared = _prepare(stack)
-    return jax.vmap(lambda *pixel: _pixel(stack.form, prepared, *pixel))(wi, wo, weight, place)
-
-
-# Units of their own for the tracer: a fit differentiates both once a parameter, from one trace.
-_prepare = jax.jit(Stack.prepare)
-
-
+# A unit of its own for the tracer: a fit differentiates it once a parameter, from one trace.
 @partial(jax.jit, static_argnames="form")
 def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any, place: Any) -> Any:
     prepared = at(prepared, place)
@@ -62,7 +62,7 @@ def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any, place: Any) 
     return jnp.sum(jax.vmap(lambda w: evaluate(form, prepared, w, wo))(wi) * weight)
 
 
-_compiled = Compiled(channels)
+_shaded = Compiled(shade, ("form",))
 _BLOCK = 1024
 _LIGHTS = 512
 """Light samples that are summed at once: the quadratures of a fit and of its pictures then share one executable."""
@@ -80,25 +80,42 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, pl
     coordinates and (n,) distances, for materials that read them; without it they are drawn as they are in the mean. Materials of the
     same structure share one executable for each s up to 512, and beyond it for equal parts of s.
     """
-    pieces = -(-wi.shape[1] // _LIGHTS)
-    each = -(-wi.shape[1] // pieces)
+    pieces, each, size = _shares(wi.shape[1])
     if missing := pieces * each - wi.shape[1]:
         wi = np.pad(wi, ((0, 0), (0, missing), (0, 0)), "edge")
         weight = np.pad(weight, ((0, 0), (0, missing), (0, 0)))
-    size = block_size(each)
     stack = stack.astype(np.float32)
     place = narrowed(place, stack.reads)
     rows = []
     with jax.enable_x64(False):
+        made = prepared(stack)
         for start in range(0, len(wo), size):
             to_light, to_eye, bright = (_padded(a[start : start + size], size) for a in (wi, wo, weight))
             bright = np.moveaxis(bright, -1, 0)
             there = jax.tree.map(lambda a, start=start: _padded(a[start : start + size], size), place)
             lights = [slice(light, light + each) for light in range(0, pieces * each, each)]
             # All are started before the first is waited for.
-            sums = [_compiled(stack, to_light[:, some], to_eye, bright[:, :, some], there) for some in lights]
+            sums = [_shaded(made, to_light[:, some], to_eye, bright[:, :, some], there, form=stack.form) for some in lights]
             rows.append(np.sum([np.asarray(part) for part in sums], 0).T)
     return np.concatenate(rows)[: len(wo)]
+
+
+def begin(stack: Stack, lights: int, place: Place | None = None) -> None:
+    """Have what `predict` needs for pixels of so many light samples compiled, while other work goes on."""
+    _, each, size = _shares(lights)
+    stack = stack.astype(np.float32)
+    array = lambda *shape: jax.ShapeDtypeStruct(shape, np.float32)  # noqa: E731
+    there = jax.tree.map(lambda a: array(size, *a.shape[1:]), narrowed(place, stack.reads))
+    with jax.enable_x64(False):
+        made = prepared.begin(stack)
+        _shaded.begin(made, array(size, each, 3), array(size, 3), array(3, size, each), there, form=stack.form)
+
+
+def _shares(lights: int) -> tuple[int, int, int]:
+    """Equal parts of the light samples, samples in each, and pixels of a block."""
+    pieces = -(-lights // _LIGHTS)
+    each = -(-lights // pieces)
+    return pieces, each, block_size(each)
 
 
 def _padded(a: np.ndarray, size: int) -> np.ndarray:

@@ -6,7 +6,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from ._chunk import static, struct
+from ._chunk import static, struct, where
+from ._compiled import Compiled
 from ._place import Place, needs, reads
 from ._types import Colour, Vec3
 from .forms import corrected, faithful, patina, precise, weathering
@@ -66,6 +67,10 @@ class Stack:
         return replace(self, layers=left)
 
 
+prepared = Compiled(Stack.prepare, optimise=False)
+"""What is computed once per material, compiled."""
+
+
 def at(prepared: Any, place: Place | None) -> Any:
     """A prepared material as it is at one place of the surface; without a place, as it is everywhere or in the mean."""
     if place is None:
@@ -86,6 +91,6 @@ def evaluate(form: Form, prepared: Any, wi: Vec3, wo: Vec3) -> Colour:
         return FORMS[type(form)].evaluate(prepared, wi, wo, form)
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = jnp.where(lit, wi, up)
-    wo = jnp.where(lit, wo, up)
-    return jnp.where(lit, prepared.evaluate(wi, wo), 0.0)
+    wi = where(lit, wi, up)
+    wo = where(lit, wo, up)
+    return where(lit, prepared.evaluate(wi, wo), 0.0)

@@ -8,6 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from .. import render
 from .._compiled import CLOCK
 from .._place import narrowed
 from ..capture.samples import QUADRATURE, Samples, View
@@ -16,7 +17,7 @@ from ..render import predict
 from ..stack import Stack
 from .blocks import Block, arrange, channels_first
 from .parameters import Parametrisation, parametrise, with_fixed
-from .residuals import NEAR, depths, initial, parts, scaled, step
+from .residuals import NEAR, begin, depths, initial, parts, scaled, step
 from .result import FitResult, Held, Minimum, Row
 from .solve import NormalLevenbergMarquardt
 from .uncertainty import GROUPS, estimate
@@ -88,6 +89,10 @@ class _Fit:
 
     def run(self) -> FitResult:
         origin = self.free.pack(self.start)
+        begin(origin, self.start, self.blocks, free=self.free)
+        for view, samples in zip(self.views, self.samples, strict=True):
+            stack = scaled(self.start, view.scales(self.start))
+            render.begin(stack, samples.wi.shape[1], narrowed(samples.place, stack.needs))
         self._weigh(None)
         self._drop_blind(origin)
         origin = self.free.pack(self.start)

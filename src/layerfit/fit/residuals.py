@@ -9,11 +9,11 @@ import jax
 import numpy as np
 
 from .._compiled import Compiled
-from ..render import channels
-from ..stack import Stack
+from ..render import shade
+from ..stack import Stack, prepared
 from .blocks import Block
 from .parameters import Parametrisation
-from .solve import Normal, columns, normal_equations, products
+from .solve import Normal, columns, normal_equations, products, tangents
 
 
 def depths(layer: Any) -> list[str]:
@@ -33,18 +33,19 @@ def scaled(stack: Stack, scale: Any) -> Stack:
     return dataclasses.replace(stack, layers=tuple(layers), base=base)
 
 
-def _material(start: Stack, free: Parametrisation, fields: list[Any], block: Block) -> Stack:
-    return scaled(free.put(start, fields).astype(block.target.dtype), block.scale)
+def _material(u: Any, start: Stack, scale: Any, *, free: Parametrisation) -> tuple[Any, Any]:
+    """The material at `u`, prepared, and its derivatives."""
+    return tangents(lambda fields: scaled(free.put(start, fields).astype(u.dtype), scale).prepare(), free.fields(u))
 
 
-def _columns(u: Any, start: Stack, block: Block, *, free: Parametrisation) -> Any:
-    """The model's derivatives and residual over one block of pixels at `u`, in the precision of the block."""
+def _columns(material: tuple[Any, Any], block: Block, *, form: Any) -> Any:
+    """The model's derivatives and residual over one block of pixels, in the precision of the block."""
 
-    def residual(fields: list[Any]) -> Any:
-        model = channels(_material(start, free, fields, block), block.wi, block.wo, block.weight, block.place)
+    def residual(prepared: Any) -> Any:
+        model = shade(prepared, block.wi, block.wo, block.weight, block.place, form=form)
         return (model - block.target) * block.inverse_sigma
 
-    return columns(residual, free.fields(u))
+    return columns(residual, *material)
 
 
 def _advance(u: Any, state: Any, bounds: Any, total: Any, *, free: Parametrisation, solver: Any) -> Any:
@@ -54,8 +55,31 @@ def _advance(u: Any, state: Any, bounds: Any, total: Any, *, free: Parametrisati
     return u, state
 
 
-_block_columns = Compiled(_columns, ("free",))
+_derivatives = Compiled(_material, ("free",), optimise=False)
+_block_columns = Compiled(_columns, ("form",))
 _solver_step = Compiled(_advance, ("free", "solver"))
+
+
+def begin(u: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation) -> None:
+    """Have what a step needs compiled, while other work goes on."""
+    with jax.enable_x64(False):
+        made = prepared.begin(scaled(start.astype(np.float32), blocks[0].scale))
+    # The larger part first; that of the material goes on beside it.
+    along = jax.tree.map(lambda a: jax.ShapeDtypeStruct((len(free.free), *a.shape), a.dtype), made)
+    _block_columns.begin((made, along), blocks[0], form=start.form)
+    _derivatives.begin(np.asarray(u).astype(np.float32), start, blocks[0].scale, free=free)
+
+
+def _started(u: np.ndarray, start: Stack, blocks: Sequence[Block], free: Parametrisation) -> list[Any]:
+    """Columns of all blocks, begun; references of one thickness share the prepared material."""
+    materials: dict[bytes | None, Any] = {}
+    begun = []
+    for block in blocks:
+        key = None if block.scale is None else np.asarray(block.scale).tobytes()
+        if key not in materials:
+            materials[key] = _derivatives(u, start, block.scale, free=free)
+        begun.append(_block_columns(materials[key], block, form=start.form))
+    return begun
 
 
 def step(
@@ -64,7 +88,7 @@ def step(
     """One step of the solver from `u` over some blocks of pixels: the new point and the new state."""
     trial = np.asarray(state.y_eval).astype(np.float32)
     # All are started before the first is waited for: what cores there are work side by side.
-    started = [_block_columns(trial, start, block, free=free) for block in blocks]
+    started = _started(trial, start, blocks, free)
     total = np.sum([products(part) for part in started], 0)
     return _solver_step(u, state, bounds, total, free=free, solver=solver)
 
@@ -72,8 +96,9 @@ def step(
 def parts(u: Any, start: Stack, blocks: Sequence[Block], groups: np.ndarray, *, free: Parametrisation) -> list[Normal]:
     """Normal equations of groups of pixels, from one evaluation of the model at `u`; `groups` (groups, blocks, pixels) are masks."""
     slots = tuple(f.slots for f in free.free)
-    evaluated = [_block_columns(np.asarray(u).astype(np.float32), start, block, free=free) for block in blocks]
-    evaluated = [[np.asarray(column) for column in part] for part in evaluated]
+    evaluated = [
+        [np.asarray(column) for column in part] for part in _started(np.asarray(u).astype(np.float32), start, blocks, free)
+    ]
     return [
         normal_equations(np.sum([products([c * m for c in part]) for part, m in zip(evaluated, mask, strict=True)], 0), slots)
         for mask in groups

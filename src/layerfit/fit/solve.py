@@ -21,16 +21,21 @@ Normal = tuple[Float[Array, ""], tuple[Float[Array, " n"], Float[Array, "n n"]]]
 """Half the sum of squares, its gradient, and J^T J."""
 
 
-def columns(residual: Callable[[list[Any]], Any], fields: list[Any]) -> list[Float[Array, "c n"]]:
+def tangents(material: Callable[[list[Any]], Any], fields: list[Any]) -> tuple[Any, Any]:
+    """A prepared material, and its derivatives with one axis more in front: along each field, all channels of a colour at once."""
+    prepared, linear = jax.linearize(material, fields)
+    one_hot = jnp.eye(len(fields), dtype=fields[0].dtype)
+    along = lambda direction: linear([jnp.broadcast_to(d, f.shape) for d, f in zip(direction, fields, strict=True)])  # noqa: E731
+    return prepared, jax.vmap(along)(one_hot)
+
+
+def columns(residual: Callable[[Any], Any], prepared: Any, tangents: Any) -> list[Float[Array, "c n"]]:
     """Columns of the Jacobian, one a field, and the residual as the last.
 
-    `residual` maps fields, each a scalar or one value a channel, to (channels, pixels); its channel c must depend on channel c of
-    a colour only.
+    `residual` maps a prepared material to (channels, pixels); its channel c must depend on channel c of a colour only.
     """
-    r, linear = jax.linearize(residual, fields)
-    one_hot = jnp.eye(len(fields), dtype=r.dtype)
-    along = lambda direction: linear([jnp.broadcast_to(d, f.shape) for d, f in zip(direction, fields, strict=True)])  # noqa: E731
-    return [*jax.vmap(along)(one_hot), r]
+    r, linear = jax.linearize(residual, prepared)
+    return [*jax.vmap(linear)(tangents), r]
 
 
 def products(columns: Sequence[Any]) -> np.ndarray:

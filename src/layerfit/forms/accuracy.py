@@ -13,13 +13,15 @@ NARROW = 0.2
 
 MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("precise", "single", "diffuse"): (0.002, 0.006),
-    ("precise", "single", "conductor"): (0.022, 0.080),
-    ("precise", "single", "narrow"): (0.024, 0.102),
+    ("precise", "single", "conductor"): (0.018, 0.060),
+    ("precise", "single", "narrow"): (0.025, 0.078),
+    ("precise", "single", "beckmann, diffuse"): (0.007, 0.033),
+    ("precise", "single", "beckmann, conductor"): (0.034, 0.114),
     ("precise", "multi", "diffuse"): (0.003, 0.009),
-    ("precise", "multi", "conductor"): (0.017, 0.044),
-    ("precise", "multi", "narrow"): (0.020, 0.053),
+    ("precise", "multi", "conductor"): (0.015, 0.040),
+    ("precise", "multi", "narrow"): (0.019, 0.049),
 }
-"""(form, interface, base): median and 90th percentile over materials."""
+"""(form, interface, base, with the facets of the coat where they are not GGX): median and 90th percentile over materials."""
 
 
 def against_walk(layers: tuple[Any, ...], base: Any, form: Any) -> dict[str, Any] | None:
@@ -30,7 +32,9 @@ def against_walk(layers: tuple[Any, ...], base: Any, form: Any) -> dict[str, Any
     interface = getattr(form, "interface", "single")
     kind = "diffuse"
     if isinstance(base, Conductor):
-        kind = "narrow" if base.alpha < NARROW else "conductor"
+        kind = "narrow" if base.alpha < NARROW and layers[0].distribution == "ggx" else "conductor"
+    if layers[0].distribution != "ggx":
+        kind = f"{layers[0].distribution}, {kind}"
     if (name, interface, kind) not in MEASURED:
         return None
     p50, p90 = MEASURED[name, interface, kind]

@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import chunk, member, safe_divide, safe_power, safe_sqrt, struct
+from .._chunk import chunk, member, safe_divide, safe_power, safe_sqrt, struct, where
 from .._types import Colour, Scalar, Vec3
 from ..layers import Coat
 from ..optics.interface import (
@@ -115,7 +115,7 @@ def _interface(coat: Coat, n: Scalar, options: Corrected) -> Interface:
         n=n,
         alpha=alpha,
         tilt=facet_tilt(alpha),
-        gain=jnp.where(enters, second_facet(alpha), 0.0),
+        gain=where(enters, second_facet(alpha), 0.0),
         lengthening=spread_lengthening(eta, alpha),
         drift=drift_scale(eta, alpha),
     )
@@ -160,8 +160,8 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Corrected) -> Colo
     """BRDF [1/sr] of unit directions above the surface; 0 where either is below it."""
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = jnp.where(lit, wi, up)
-    wo = jnp.where(lit, wo, up)
+    wi = where(lit, wi, up)
+    wo = where(lit, wo, up)
     f = prepared.coats[0].evaluate(wi, wo)
     below = _enter(None, wi, wo, prepared, options)
     for coat in prepared.coats[1:]:
@@ -179,7 +179,7 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Corrected) -> Colo
         f = f + below.throughput * below.diffuse * reflected
     if prepared.coats[-1].tau_s is not None:
         f = f + below.throughput * _scattered(prepared, below, options)
-    return jnp.where(lit, f, 0.0)
+    return where(lit, f, 0.0)
 
 
 @struct
@@ -198,7 +198,7 @@ def cross(interface: Interface, coat: Coat, w: Vec3, air: Vec3) -> Crossing:
     """Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them."""
     c = facet_cosine(w, interface.tilt)
     # Out of a denser medium the fits do not hold for the energy: there the interface passes light as a smooth one.
-    c_energy = jnp.where(coat.eta >= 1.0, c, w[2])
+    c_energy = where(coat.eta >= 1.0, c, w[2])
     T = with_second_facet(coat.transmittance(c_energy), interface.gain)
     grazing = drift(w, interface.drift, interface.alpha)
     # From air at once, not from layer to layer: going back to index 1 gives the same direction to the last bit.
@@ -316,7 +316,7 @@ def _returned(target: Lobe, below: _Below, options: Corrected) -> Colour:
 def edge_reflection(sine: Scalar, cosine: Scalar, n: Scalar, alpha: Scalar) -> Scalar:
     """Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n."""
     m = safe_divide(0.5 * (1.0 - sine), n * cosine)
-    return jnp.where(n > 1.0, 0.5 - safe_divide(0.5 * m, safe_sqrt(alpha * alpha + m * m)), 0.0)
+    return where(n > 1.0, 0.5 - safe_divide(0.5 * m, safe_sqrt(alpha * alpha + m * m)), 0.0)
 
 
 def _per_axis(widths: list[Width], width_along: Callable[[int], Scalar]) -> Width:
@@ -372,7 +372,7 @@ def trapped_light(lobe: Lobe, tau: Colour | None, n: Scalar) -> Colour:
     F0 = lobe.energy(lobe.reflectance(jnp.ones_like(n)))
     kept = jnp.maximum(0.0, 1.0 - lost - scattered / (n * n))
     freed = F0 * F0 * scattered * scattered * (critical * critical) * t / jnp.pi
-    return jnp.where(critical > 1e-4, freed / jnp.maximum(1.0 - F0 * kept * t, 1e-6), 0.0)
+    return where(critical > 1e-4, freed / jnp.maximum(1.0 - F0 * kept * t, 1e-6), 0.0)
 
 
 def _nodes(dtype: np.dtype) -> tuple[np.ndarray, np.ndarray]:
@@ -467,8 +467,8 @@ def _passed_up(coats: list[Coat], interfaces: list[Interface], p2: Scalar) -> Co
     for depth, (coat, interface) in enumerate(zip(coats, interfaces, strict=True)):
         cosine2 = 1.0 - p2 / (n_above * n_above)
         w = jnp.stack([safe_sqrt(p2) / n_above, jnp.zeros_like(p2), safe_sqrt(cosine2)])
-        c = jnp.where(coat.eta >= 1.0, facet_cosine(w, interface.tilt), w[2])
-        T = jnp.where(cosine2 > 0.0, with_second_facet(coat.transmittance(c), interface.gain), 0.0)
+        c = where(coat.eta >= 1.0, facet_cosine(w, interface.tilt), w[2])
+        T = where(cosine2 > 0.0, with_second_facet(coat.transmittance(c), interface.gain), 0.0)
         if depth == 0:
             S = T
         else:

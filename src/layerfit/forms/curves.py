@@ -12,10 +12,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Array, Float
 
-from .._chunk import chunk, member, safe_divide, safe_sqrt, struct
+from .._chunk import chunk, clip, member, safe_divide, safe_sqrt, struct, where
 from .._types import Colour, Scalar, Vec4
-from ..optics.interface import facet_tilt, second_facet
+from ..optics.interface import facet_tilt, rough_transmittance, second_facet
 from . import tables
 
 DEGREE = 7
@@ -24,11 +25,20 @@ DEGREE = 7
 SMOOTH_ETA = 1.15
 """First index of the tables; below it, an interface tends to none at all."""
 
+CELLS = 6
+"""Of cosines below, inside and outside of the edge of total reflection each."""
+
 GAUSS = 8
 """Nodes of the quadrature of diffuse light, inside and outside of the edge of total reflection each."""
 
-STEER = 1.0288
+STEER = 1.032
 """Share of the tables' turn of the mean direction."""
+
+P = 1.412
+"""Widths add as powers."""
+
+WIDTH = 1.107
+"""Width of a GGX lobe with the spread of the tables, over that spread."""
 
 
 @struct
@@ -47,8 +57,25 @@ class Interface:
     path_high: Vec4 = member("")
     theta: Vec4 = member("scale of the path's distribution")
     theta_high: Vec4 = member("")
-    returned: Vec4 = member("energy that it reflects back down")
-    returned_high: Vec4 = member("")
+
+
+@struct
+class Nodes:
+    """The same at the cosines of the tables, and what the interface reflects back down: for what is summed once per material."""
+
+    z: Float[Array, " m"]
+    """Cosine of the median direction below."""
+    T: Float[Array, " m"]
+    """Energy that passes."""
+    spread: Float[Array, " m"]
+    path: Float[Array, " m"]
+    """Mean path, in thicknesses."""
+    theta: Float[Array, " m"]
+    R: Float[Array, " k"]
+    """Energy that is reflected of light from below, at cosines even from 0 to the edge of total reflection and from there to 1."""
+    cosines: Float[Array, " q"]
+    weights: Float[Array, " q"]
+    """Of the quadrature of diffuse light from below, R and the cosines included."""
 
 
 @chunk
@@ -68,56 +95,81 @@ def curve(low: Vec4, high: Vec4, s: Scalar) -> Scalar:
 @chunk
 def presence(eta: Scalar) -> Scalar:
     """0 where the indices match and there is no interface, 1 from the first index of the tables on."""
-    t = jnp.clip((eta - 1.0) / (SMOOTH_ETA - 1.0), 0.0, 1.0)
+    t = clip((eta - 1.0) / (SMOOTH_ETA - 1.0), 0.0, 1.0)
     return t * (2.0 - t)
 
 
-def bake(eta: Scalar, alpha: Scalar, kind: Literal["single", "multi"]) -> tuple[Interface, tuple[Any, Any]]:
-    """Curves of one interface; and what it reflects back, as the cosines and weights of a quadrature (see `diffuse_return`).
-
-    Numbers stay numbers, also inside a trace: a shader then has them as constants.
-    """
+def bake(eta: Scalar, alpha: Scalar, kind: Literal["single", "multi"]) -> tuple[Interface, Nodes]:
+    """Curves of one interface, and what they run through. Numbers stay numbers, also inside a trace: a shader has them as constants."""
     if isinstance(eta, Tracer) or isinstance(alpha, Tracer):
         return _bake(eta, alpha, kind)
     with jax.ensure_compile_time_eval():
-        interface, (cosines, weights) = _bake(jnp.asarray(eta), jnp.asarray(alpha), kind)
-    return interface, (np.asarray(cosines), np.asarray(weights))
+        interface, nodes = _bake(jnp.asarray(eta), jnp.asarray(alpha), kind)
+    return interface, jax.tree.map(np.asarray, nodes)
 
 
-def _bake(eta: Scalar, alpha: Scalar, kind: Literal["single", "multi"]) -> tuple[Interface, tuple[Any, Any]]:
+def _bake(eta: Scalar, alpha: Scalar, kind: Literal["single", "multi"]) -> tuple[Interface, Nodes]:
     baked = _baking(kind)
     dtype = eta.dtype
     at = jnp.einsum("e,a,eaq->q", _cubic(eta, baked.eta), _cubic(alpha, baked.alpha), jnp.asarray(baked.values, dtype))
-    nodes = len(baked.mu)
-    dT, rx, w, m, theta = at[: 5 * nodes].reshape(5, nodes)
-    R = at[5 * nodes :]
+    count = len(baked.mu)
+    dT, rx, w, m, theta = at[: 5 * count].reshape(5, count)
     there = presence(eta)
+    R = there * at[5 * count :]
     mu = jnp.asarray(baked.mu, dtype)
+    sin2 = (1.0 - mu) * (1.0 + mu)
     bend = 1.0 + STEER * there * (rx - 1.0)
-    sine = jnp.minimum(jnp.sqrt((1.0 - mu) * (1.0 + mu)) * bend / eta, 0.9998)
+    sine = jnp.minimum(jnp.sqrt(sin2) * bend / eta, 0.9998)
     z = jnp.sqrt((1.0 - sine) * (1.0 + sine))
-    # From below, the light that the median direction stands for comes at the cosine of a smooth interface, past its edge.
-    edge = safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta
-    part = (jnp.sqrt((eta - 1.0) * (eta + 1.0) + mu * mu) / eta - edge) / (1.0 - edge)
-    returned = jax.vmap(lambda p: _cubic(p, baked.part))(part) @ R
-    rows = (there * dT, bend, there * w, 1.0 + there * (m * z - 1.0), theta, there * returned)
-    halves = [half for row in rows for half in jnp.split(jnp.asarray(baked.fit, dtype) @ row, 2)]
+    spread = WIDTH * there * w
+    rows = (there * dT, bend, spread, 1.0 + there * (m * z - 1.0), theta)
+    curves = [half for row in rows for half in jnp.split(polynomial(row), 2)]
     rough = jnp.minimum(alpha, 1.0)
+    tilt, gain = facet_tilt(rough), second_facet(rough)
+    closed = jax.vmap(lambda c: rough_transmittance(c, eta, gain))(jnp.sqrt(mu * mu + tilt * sin2))
+    T = clip(closed + rows[0], 0.0, 1.0)
     x, dx = (jnp.asarray(a, dtype) for a in _gauss())
+    edge = safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta
     cosines = jnp.concatenate([edge * x, edge + (1.0 - edge) * x])
     widths = jnp.concatenate([edge * dx, (1.0 - edge) * dx])
-    weights = 2.0 * there * (jnp.asarray(baked.quadrature, dtype) @ R) * cosines * widths
-    return Interface(facet_tilt(rough), second_facet(rough), *halves), (cosines, weights)
+    weights = 2.0 * (jnp.asarray(baked.quadrature, dtype) @ R) * cosines * widths
+    nodes = Nodes(
+        z,
+        T,
+        spread * alpha,
+        jnp.maximum(rows[3], 1.0) / z,
+        jnp.maximum(theta, 1e-4),
+        jnp.asarray(baked.cells, dtype) @ R,
+        cosines,
+        weights,
+    )
+    return Interface(tilt, gain, *curves), nodes
 
 
-def diffuse_return(below: tuple[Any, Any], tau: Colour | None) -> Colour:
-    """Part of diffuse light that comes back from the coat: 2 int R exp(-2 tau / mu) mu dmu, by the quadrature of `bake`."""
-    cosines, weights = below
+def diffuse_return(nodes: Nodes, tau: Colour | None) -> Colour:
+    """Part of diffuse light that comes back from the coat: 2 int R exp(-2 tau / mu) mu dmu."""
     total: Any = 0.0
     for k in range(2 * GAUSS):
-        kept = 1.0 if tau is None else jnp.exp(-(2.0 * tau) * safe_divide(1.0, jnp.asarray(cosines[k])))
-        total = total + weights[k] * kept
+        kept = 1.0 if tau is None else jnp.exp(-(2.0 * tau) * safe_divide(1.0, jnp.asarray(nodes.cosines[k])))
+        total = total + nodes.weights[k] * kept
     return jnp.asarray(total)
+
+
+def hemispherical(values: Float[Array, " m"]) -> Scalar:
+    """2 int f mu dmu of values at the cosines of the tables above."""
+    return jnp.asarray(_above()[1], values.dtype) @ values
+
+
+def polynomial(values: Float[Array, " m"]) -> Float[Array, " c"]:
+    """Coefficients of the curve through values at the cosines of the tables above: least squares."""
+    return jnp.asarray(_above()[0], values.dtype) @ values
+
+
+@chunk
+def absorbed(path: Scalar, theta: Scalar, tau: Colour) -> Colour:
+    """Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta."""
+    scale = jnp.maximum(theta, 1e-6)
+    return jnp.exp(-(tau + jnp.maximum(path - 1.0, 1e-9) * (jnp.log1p(scale * tau) / scale)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -127,37 +179,47 @@ class _Baking:
     eta: np.ndarray
     alpha: np.ndarray
     mu: np.ndarray
-    part: np.ndarray
     values: np.ndarray
     """(eta, alpha, all that is tabulated)."""
-    fit: np.ndarray
-    """(DEGREE + 1, mu): least squares."""
     quadrature: np.ndarray
     """(2 Gauss nodes, part): interpolation."""
+    cells: np.ndarray
+    """(2 CELLS + 1, part): interpolation."""
 
 
 @cache
 def _baking(kind: Literal["single", "multi"]) -> _Baking:
     t = tables.load(kind)
-    mu = t.mu.astype(float)
     edge = np.sqrt(1.0 - 1.0 / t.eta[0].astype(float) ** 2)
     below = t.mu_below[0].astype(float)
     part = np.where(below < edge, below / edge, 1.0 + (below - edge) / (1.0 - edge)) - 1.0
     columns = (t.dT, t.rx, t.w, 1.0 + t.kt, np.exp(t.lt), t.Rb)
-    s = np.maximum(2.0 * (np.sqrt(mu) - np.sqrt(mu[0])) / (1.0 - np.sqrt(mu[0])) - 1.0, -1.0)
     x, _ = _gauss()
     with jax.enable_x64(True), jax.ensure_compile_time_eval():
-        at = np.concatenate([x - 1.0, x])
-        quadrature = np.stack([np.asarray(_cubic(jnp.asarray(p), part)) for p in at])
+        at = lambda parts: np.stack([np.asarray(_cubic(jnp.asarray(p), part)) for p in parts])  # noqa: E731
+        quadrature, cells = at(np.concatenate([x - 1.0, x])), at(np.arange(2 * CELLS + 1) / CELLS - 1.0)
     return _Baking(
         eta=t.eta.astype(float),
         alpha=t.alpha.astype(float),
-        mu=mu,
-        part=part,
+        mu=t.mu.astype(float),
         values=np.concatenate(columns, -1).astype(float),
-        fit=np.linalg.pinv(np.polynomial.polynomial.polyvander(s, DEGREE)),
         quadrature=quadrature,
+        cells=cells,
     )
+
+
+@cache
+def _above() -> tuple[np.ndarray, np.ndarray]:
+    """For values at the cosines of the tables above: coefficients of the polynomial, and 2 int f mu dmu of it."""
+    mu = tables.load("single").mu.astype(float)
+    first = np.sqrt(mu[0])
+    powers = lambda mu: np.polynomial.polynomial.polyvander(  # noqa: E731
+        np.maximum(2.0 * (np.sqrt(mu) - first) / (1.0 - first) - 1.0, -1.0), DEGREE
+    )
+    fit = np.linalg.pinv(powers(mu))
+    x, dx = np.polynomial.legendre.leggauss(40)
+    x = 0.5 * (x + 1.0)
+    return fit, (dx * x) @ powers(x) @ fit
 
 
 @cache
@@ -182,14 +244,14 @@ def _cubic(x: Scalar, nodes: np.ndarray) -> Any:
     slope[-1, -2:] = -1.0 / h[-1], 1.0 / h[-1]
     slope[-1] = 2.0 * slope[-1] - slope[-2]
     dtype = x.dtype
-    x = jnp.clip(x, float(nodes[0]), float(nodes[-1]))
+    x = clip(x, float(nodes[0]), float(nodes[-1]))
     t = (x - jnp.asarray(nodes[:-1], dtype)) / jnp.asarray(h, dtype)
     inside = (x >= jnp.asarray(nodes[:-1], dtype)) & ((x < jnp.asarray(nodes[1:], dtype)) | (np.arange(n - 1) == n - 2))
     u = 1.0 - t
-    value0 = jnp.where(inside, (1.0 + 2.0 * t) * u * u, 0.0)
-    value1 = jnp.where(inside, (1.0 + 2.0 * u) * t * t, 0.0)
-    slope0 = jnp.where(inside, jnp.asarray(h, dtype) * t * u * u, 0.0)
-    slope1 = jnp.where(inside, -jnp.asarray(h, dtype) * u * t * t, 0.0)
+    value0 = where(inside, (1.0 + 2.0 * t) * u * u, 0.0)
+    value1 = where(inside, (1.0 + 2.0 * u) * t * t, 0.0)
+    slope0 = where(inside, jnp.asarray(h, dtype) * t * u * u, 0.0)
+    slope1 = where(inside, -jnp.asarray(h, dtype) * u * t * t, 0.0)
     pad = jnp.zeros(1, dtype)
     value = jnp.concatenate([value0, pad]) + jnp.concatenate([pad, value1])
     return value + (jnp.concatenate([slope0, pad]) + jnp.concatenate([pad, slope1])) @ jnp.asarray(slope, dtype)

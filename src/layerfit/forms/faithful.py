@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import jax.numpy as jnp
 
-from .._chunk import safe_divide, struct
+from .._chunk import safe_divide, struct, where
 from .._types import Colour, Vec3
 from ..layers import Coat
 from ..optics.medium import refract_about_facet, refract_about_normal, transmittance
@@ -66,10 +66,10 @@ def _evaluate(coats: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, options: F
     # Below the surface, or lost by total internal reflection above: no light. The dummy keeps derivatives finite.
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = jnp.where(lit, wi, up)
-    wo = jnp.where(lit, wo, up)
+    wi = where(lit, wi, up)
+    wo = where(lit, wo, up)
     f = _coat_over(coats[0], coats[1:], base, wi, wo, options) if coats else base.evaluate(wi, wo)
-    return jnp.where(lit, f, 0.0)
+    return where(lit, f, 0.0)
 
 
 def _coat_over(coat: Coat, below: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, options: Faithful) -> Colour:

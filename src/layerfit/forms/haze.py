@@ -19,7 +19,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, dot, member, safe_power, safe_sqrt, struct
+from .._chunk import chunk, dot, member, safe_power, safe_sqrt, struct, where
 from .._types import Colour, Number, Scalar, Vec3
 from ..layers import Coat
 from ..optics.microfacet import Width, half_cosine
@@ -150,9 +150,9 @@ def _arriving(tau: Colour, base: Surface, R: Colour, cosine: Scalar) -> list[lis
 def _mean_absorptance(x: Colour) -> Colour:
     """(x - 1 + exp(-x)) / x^2: what a layer takes of the light that is sent out evenly in it, over its depth x."""
     thin = x < 0.1
-    safe = jnp.where(thin, 1.0, x)
+    safe = where(thin, 1.0, x)
     series = 0.5 - x / 6.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0 * (1.0 - x / 7.0))))
-    return jnp.where(thin, series, (1.0 - mean_transmittance(safe)) / safe)
+    return where(thin, series, (1.0 - mean_transmittance(safe)) / safe)
 
 
 def _exchanges(albedos: Sequence[Colour], arriving: Sequence[Sequence[Colour]]) -> list[list[Colour]]:

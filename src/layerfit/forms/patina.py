@@ -11,7 +11,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, dot, member, struct
+from .._chunk import chunk, dot, member, struct, where
 from .._place import Place
 from .._types import Colour, Scalar, Vec3
 from ..errors import InputError
@@ -116,8 +116,8 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
     """BRDF [1/sr] of unit directions above the surface; 0 where either is below it. `form` is that of the film."""
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = jnp.where(lit, wi, up)
-    wo = jnp.where(lit, wo, up)
+    wi = where(lit, wi, up)
+    wo = where(lit, wo, up)
     spot = prepared.spot or mean_spot(prepared)
     film = _as_thick(prepared.film, spot.thickness)
     patina = FORMS[type(form)].evaluate(film, wi, wo, form)
@@ -126,7 +126,7 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
         patina = patina + scattered
     bare = prepared.bare.evaluate(wi, wo)
     f = spot.cover.bare * bare + spot.cover.covered * patina
-    return jnp.where(lit, f, 0.0)
+    return where(lit, f, 0.0)
 
 
 def _as_thick(film: Any, thickness: Scalar) -> Any:

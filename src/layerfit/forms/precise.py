@@ -3,10 +3,10 @@
 What the coat's rough top does to light is not computed but read, from tables that the random walk made (`tables`): the energy that
 passes, the median direction of the refracted light, its spread, and the distribution of its path. Each is a function of one cosine;
 `prepare` looks the material up and bakes the functions as polynomials, so that evaluation, in JAX and in the shader, is closed form.
-The base then answers with one lobe for light that met it once and one for all that met it more often. Reciprocal by construction:
-light that comes and light that leaves are treated alike.
+The base then answers with a lobe for light that met it once; light that met it more often is summed by `bounces`. Reciprocal by
+construction: light that comes and light that leaves are treated alike.
 
-The constants below were fitted to the random walk, on grids of random materials; the terms for several bounces are a fit, no physics.
+The constants below were fitted to the random walk, on grids of random materials.
 """
 
 import dataclasses
@@ -14,51 +14,33 @@ from typing import Any, Literal
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, member, safe_power, safe_sqrt, struct
+from .._chunk import chunk, clip, member, safe_power, safe_sqrt, struct, where
 from .._types import Colour, Number, Scalar, Vec3
 from ..layers import Coat
 from ..optics.interface import facet_cosine, rough_transmittance
 from ..optics.microfacet import half_cosine
 from ..surfaces.microfacet import Conductor
-from .curves import Interface, bake, curve, diffuse_return, grazing, presence
+from .bounces import Curve, amount, bounces, wider
+from .curves import Interface, P, absorbed, bake, curve, diffuse_return, grazing, presence
 
 BAKED = ("alpha", "eta")
 """Fields of the coat that a shader holds as constants, through the curves that they give."""
 
-P = 1.4037
-"""Widths add as powers."""
-WIDTH = 1.1159
-"""Width of a GGX lobe with the spread of the tables, over that spread."""
-CONDENSE = 0.72041
+HELD = ("interface", "again", "rest")
+"""Parts of a prepared material that a shader holds as constants, also where its other numbers can be set."""
+
+CONDENSE = 0.7504
 """Share of the tilt of the facets that the base does not ask for, which the two crossings take."""
-RISE = 0.32949
+RISE = 0.3036
 """Growth of the first lobe with the coat's roughness."""
-RATIO, TAIL = 0.45118, 1.1602
+RATIO, TAIL = 0.3271, 0.5566
 """How a lobe that was widened differs from GGX: less peaked, with a longer tail."""
-DIRECT = (0.25768, 0.3041, 1.2079)
+BECKMANN = 0.6
+"""Width of the GGX facets that treat light which crosses as Beckmann facets of width 1 do: their slopes are less spread."""
+DIRECT = (0.3296, 0.3522, 1.803)
 """Part of the path's spread that counts for absorption, by the share of the base in the lobe's width: d + c w^e."""
-DIRECT_PATH = (0.61718, -0.35382, 0.97817)
+DIRECT_PATH = (0.3096, 0.2662, 1.772)
 """The same for the projected area."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Bounces:
-    """Constants of light that met the base more than once: fitted."""
-
-    n: float = 1.2706
-    c: float = 5.4277
-    g: float = 0.50358
-    l: float = 1.1633
-    ca: float = 0.86615
-    cb: float = 0.015659
-    nb: float = 3.5728
-    sp: float = 0.77853
-    gl: float = 1.0398
-    sa: float = 1.3495
-    q1: float = 0.18469
-
-
-BOUNCES = Bounces()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,8 +58,8 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
     if len(layers) != 1:
         return "it is for one coat" if layers else "there is no coat"
     coat = layers[0]
-    if coat.alpha is None or coat.distribution != "ggx":
-        return f"{coat.name} is not isotropic GGX"
+    if coat.alpha is None:
+        return f"{coat.name} is not isotropic"
     if coat.fresnel != "exact":
         return f"{coat.name} has the reflectance of {coat.fresnel}, and the tables were made with the exact one"
     if coat.tau_s is not None:
@@ -95,13 +77,17 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
 
 @struct
 class Prepared:
-    """Coat and base with relative indices, the baked interface, and what returns to the base."""
+    """Coat and base with relative indices, the baked interface, and what goes to and fro below it."""
 
     coat: Coat
     interface: Interface
     base: Any
-    returned: Colour
-    """Part of diffuse light that returns from the coat."""
+    returned: Colour | None
+    """Part of diffuse light that returns from the coat, for a diffuse base."""
+    again: Curve | None
+    """Of a metal: weight of the wider lobe of light that met it twice."""
+    rest: Curve | None
+    """Of a metal: fourth root of the light that is left."""
 
 
 @struct
@@ -113,7 +99,7 @@ class Crossing:
     a: Scalar = member("spread, as a width")
     path: Scalar = member("mean path, in thicknesses")
     theta: Scalar = member("scale of the path's distribution")
-    R: Scalar = member("energy that the interface reflects back down")
+    s: Scalar = member("argument of the baked curves")
 
 
 def prepare(coats: tuple[Coat, ...], base: Any, options: Precise) -> Prepared:
@@ -121,30 +107,38 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Precise) -> Prepared:
     if reason := refuses(coats, base):
         raise ValueError(f"the precise form is not for this material: {reason}")
     coat = coats[0]
-    interface, below = bake(coat.eta, coat.alpha, options.interface)
+    interface, nodes = bake(coat.eta, crossed(coat), options.interface)
     coat = coat.below(jnp.ones_like(coat.eta))
-    return Prepared(coat, interface, base.below(coat.eta), diffuse_return(below, coat.tau))
+    base = base.below(coat.eta)
+    if isinstance(base, Conductor):
+        return Prepared(coat, interface, base, None, *bounces(nodes, crossed(coat), coat, base))
+    return Prepared(coat, interface, base, diffuse_return(nodes, coat.tau), None, None)
+
+
+def crossed(coat: Coat) -> Scalar:
+    """Width of the GGX facets that light which crosses the coat meets."""
+    return coat.alpha if coat.distribution == "ggx" else BECKMANN * coat.alpha
 
 
 def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Precise) -> Colour:
     """BRDF [1/sr] of unit directions above the surface; 0 where either is below it."""
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = jnp.where(lit, wi, up)
-    wo = jnp.where(lit, wo, up)
+    wi = where(lit, wi, up)
+    wo = where(lit, wo, up)
     coat = prepared.coat
-    i = pass_interface(prepared.interface, coat.eta, coat.alpha, wi)
-    o = pass_interface(prepared.interface, coat.eta, coat.alpha, wo)
-    f = coat.evaluate(wi, wo) + below(i, o, coat, prepared.base, prepared.returned)
-    return jnp.where(lit, f, 0.0)
+    i, o = (pass_interface(prepared.interface, coat.eta, crossed(coat), w) for w in (wi, wo))
+    return where(lit, coat.evaluate(wi, wo) + below(i, o, prepared), 0.0)
 
 
-def below(i: Crossing, o: Crossing, coat: Coat, base: Any, returned: Colour) -> Colour:
-    """Light from below the coat [1/sr]; `base` and `coat` with relative indices."""
+def below(i: Crossing, o: Crossing, prepared: Prepared) -> Colour:
+    """Light from below the coat [1/sr]."""
+    coat, base = prepared.coat, prepared.base
     throughput = i.T * o.T / (coat.eta * coat.eta)
     if not isinstance(base, Conductor):
         A = 1.0 if coat.tau is None else absorbed(i.path, i.theta, coat.tau) * absorbed(o.path, o.theta, coat.tau)
-        return throughput * A * base.evaluate(i.w, o.w) / jnp.maximum(1.0 - base.albedo * returned, 1e-6)
+        return throughput * A * base.evaluate(i.w, o.w) / jnp.maximum(1.0 - base.albedo * prepared.returned, 1e-6)
+    alpha = crossed(coat)
     share = base_share(i, o, base.alpha)
     yi, yo = lean(i, i, o, base.alpha), lean(o, i, o, base.alpha)
     A: Any = 1.0
@@ -158,33 +152,22 @@ def below(i: Crossing, o: Crossing, coat: Coat, base: Any, returned: Colour) -> 
         U = U * (path if coat.tau is None else projected(path, part * x.theta, coat.tau))
     F = base.reflectance(half_cosine(yi, yo))
     # Where the indices match there is no interface, and nothing of what it does.
-    rise = 1.0 + RISE * presence(coat.eta) * coat.alpha * coat.alpha * share
-    first = rise * lobe(i, o, yi, yo, base.alpha, base.alpha)
-    again = _again(i, o, yi, yo, coat, base, A, returned)
-    return throughput * F * A * U * (first + F * again[0]) + throughput * F * F * A * again[1]
-
-
-def _again(
-    i: Crossing, o: Crossing, yi: Vec3, yo: Vec3, coat: Coat, base: Conductor, A: Colour, returned: Colour
-) -> tuple[Colour, Colour]:
-    """Light that met the base more than once: a wider lobe, and a diffuse part."""
-    b = BOUNCES
-    alpha2 = base.alpha * base.alpha
-    wide = wider(base.alpha, coat.alpha)
-    power, narrow = safe_power(wide, b.n), safe_power(base.alpha, b.nb)
-    diffuse, broad = power / (power + b.c), narrow / (narrow + b.cb)
-    kept = base.f0 * (1.0 - b.l * alpha2 / (1.0 + alpha2)) * returned * (1.0 + b.q1 * coat.alpha)
-    series = 1.0 / (1.0 - jnp.minimum(kept, 0.97))
-    R = 0.5 * (i.R + o.R)
-    scattered = (1.0 + b.sa * coat.alpha) * (1.0 - diffuse) * ((1.0 - broad) * b.sp * R * A + broad * b.gl * returned)
-    lobe_again = series * scattered * lobe(i, o, yi, yo, wide, base.alpha)
-    return lobe_again, series * diffuse * b.g * returned / jnp.pi
+    rise = 1.0 + RISE * presence(coat.eta) * alpha * alpha * share
+    lobes: Any = rise * lobe(i, o, yi, yo, base.alpha, base.alpha)
+    if prepared.again is None or prepared.rest is None:
+        return throughput * F * A * U * lobes
+    again = 0.5 * F * (amount(prepared.again, i.s) + amount(prepared.again, o.s))
+    lobes = lobes + again * lobe(i, o, yi, yo, wider(base.alpha, alpha), base.alpha)
+    root = amount(prepared.rest, i.s) * amount(prepared.rest, o.s)
+    rest = root * root * ahead(i, o, coat.eta, base.alpha)
+    return throughput * A * (F * U * lobes + rest)
 
 
 @chunk
-def wider(alpha: Scalar, coat_alpha: Scalar) -> Scalar:
-    """Width of the lobe of light that met a base of width alpha twice, and the coat in between."""
-    return safe_power(2.0 * safe_power(alpha, P) + BOUNCES.ca * safe_power(coat_alpha, P), 1.0 / P)
+def ahead(i: Crossing, o: Crossing, eta: Scalar, alpha: Scalar) -> Scalar:
+    """What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base."""
+    back = eta * eta * (i.w[0] * o.w[0] + i.w[1] * o.w[1])
+    return jnp.maximum(1.0 - (1.0 - jnp.minimum(alpha, 1.0)) * back, 0.0) / jnp.pi
 
 
 @chunk
@@ -192,24 +175,16 @@ def pass_interface(interface: Interface, eta: Scalar, alpha: Scalar, w: Vec3) ->
     """Follow one direction through the coat's rough top."""
     s = grazing(w[2])
     T = rough_transmittance(facet_cosine(w, interface.tilt), eta, interface.gain)
-    T = jnp.clip(T + curve(interface.passed, interface.passed_high, s), 0.0, 1.0)
+    T = clip(T + curve(interface.passed, interface.passed_high, s), 0.0, 1.0)
     bend = curve(interface.bend, interface.bend_high, s) / eta
     sine = safe_sqrt(w[0] * w[0] + w[1] * w[1])
     bend = jnp.minimum(bend, 0.9998 / jnp.maximum(sine, 1e-6))
     sine = sine * bend
     z = safe_sqrt((1.0 - sine) * (1.0 + sine))
-    a = WIDTH * jnp.maximum(curve(interface.spread, interface.spread_high, s), 0.0) * alpha
+    a = jnp.maximum(curve(interface.spread, interface.spread_high, s), 0.0) * alpha
     path = jnp.maximum(curve(interface.path, interface.path_high, s), 1.0) / z
     theta = jnp.maximum(curve(interface.theta, interface.theta_high, s), 1e-4)
-    R = jnp.clip(curve(interface.returned, interface.returned_high, s), 0.0, 1.0)
-    return Crossing(jnp.stack([w[0] * bend, w[1] * bend, z]), T, a, path, theta, R)
-
-
-@chunk
-def absorbed(path: Scalar, theta: Scalar, tau: Colour) -> Colour:
-    """Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta."""
-    scale = jnp.maximum(theta, 1e-6)
-    return jnp.exp(-(tau + jnp.maximum(path - 1.0, 1e-9) * (jnp.log1p(scale * tau) / scale)))
+    return Crossing(jnp.stack([w[0] * bend, w[1] * bend, z]), T, a, path, theta, s)
 
 
 @chunk
@@ -249,7 +224,7 @@ def lean(x: Crossing, i: Crossing, o: Crossing, alpha: Scalar) -> Vec3:
 @chunk
 def direct(share: Scalar, d: Number, c: Number, e: Number) -> Scalar:
     """Part of the path's spread that counts, by the base's share of the width."""
-    return jnp.clip(d + c * jnp.power(jnp.maximum(share, 1e-30), e), 0.0, 1.5)
+    return clip(d + c * jnp.power(jnp.maximum(share, 1e-30), e), 0.0, 1.5)
 
 
 @chunk
@@ -263,7 +238,7 @@ def lobe(i: Crossing, o: Crossing, yi: Vec3, yo: Vec3, alpha: Scalar, masked: Sc
     spread = safe_power(i.a, P) + safe_power(o.a, P)
     width2 = safe_power(safe_power(alpha * M, P) + spread, 2.0 / P)
     own2 = alpha * alpha * M2 + TAIL * (i.a * i.a + o.a * o.a)
-    r = jnp.clip(1.0 + RATIO * (width2 / own2 - 1.0), 0.6, 4.0)
+    r = clip(1.0 + RATIO * (width2 / own2 - 1.0), 0.6, 4.0)
     log_r = jnp.log(r)
     b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r))
     X0, X1 = i.w[0] + o.w[0], i.w[1] + o.w[1]

@@ -11,7 +11,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, member, safe_divide, struct
+from .._chunk import chunk, member, safe_divide, struct, where
 from .._place import Place
 from .._types import Colour, Scalar, Vec3
 from ..errors import InputError
@@ -173,8 +173,8 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
     """BRDF [1/sr] of unit directions above the surface; 0 where either is below it. No form changes it."""
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = jnp.where(lit, wi, up)
-    wo = jnp.where(lit, wo, up)
+    wi = where(lit, wi, up)
+    wo = where(lit, wo, up)
     stack = history(prepared)
     top, covered, bare = _open_boundary(stack)
     albedo = prepared.albedo
@@ -185,7 +185,7 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
     body = below_boundary(wi, wo, top.eta, top.escape, albedo)
     metal = prepared.base.evaluate(wi, wo)
     f = covered * (boundary + body) + bare * metal
-    return jnp.where(lit, f, 0.0)
+    return where(lit, f, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)

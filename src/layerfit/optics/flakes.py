@@ -9,7 +9,7 @@ import math
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, dot, safe_sqrt
+from .._chunk import chunk, dot, safe_sqrt, where
 from .._types import Scalar, UInt, Vec2, Vec3
 from .hashing import hash_cell, unit
 from .microfacet import beckmann_by_slopes
@@ -22,7 +22,7 @@ def flake_tilt(uv: Vec2, per_uv: Scalar, spread: Scalar, seed: UInt) -> Vec2:
     # log(1 - u) by the complement of the bits, since 1 - u would round to 0 for the steepest flakes, but not near 0: drivers' logarithms
     # lose their digits near 1.
     u = unit(bits[0], per_uv)
-    exponent = jnp.where(u < 0.25, jnp.log1p(-u), jnp.log(unit(~bits[0], per_uv)))
+    exponent = where(u < 0.25, jnp.log1p(-u), jnp.log(unit(~bits[0], per_uv)))
     slope = spread * safe_sqrt(-exponent)
     phi = 2.0 * math.pi * (unit(bits[1], per_uv) - 0.5)  # from -pi, where a GPU's sine has its digits
     return -slope * jnp.stack([jnp.cos(phi), jnp.sin(phi)])

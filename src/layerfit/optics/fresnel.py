@@ -6,7 +6,7 @@ Indices are relative: the medium below divided by the medium above.
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_divide, safe_sqrt
+from .._chunk import chunk, safe_divide, safe_sqrt, where
 from .._types import Colour, Scalar
 
 
@@ -19,14 +19,14 @@ def fresnel_dielectric(c: Scalar, eta: Colour) -> Colour:
     g2 = delta + c * c
     near_tir = 1e-8 if g2.dtype == jnp.float32 else 1e-16
     refracts = g2 > near_tir
-    g = jnp.sqrt(jnp.where(refracts, g2, 1.0))
+    g = jnp.sqrt(where(refracts, g2, 1.0))
     eta2 = eta * eta
     perpendicular = (c + g) * (c + g)
     parallel = (eta2 * c + g) * (eta2 * c + g)
     rs = -delta / perpendicular
     rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel
     reflectance = 0.5 * (rs * rs + rp * rp)
-    return jnp.where(eta == 1.0, 0.0, jnp.where(refracts, reflectance, 1.0))
+    return where(eta == 1.0, 0.0, where(refracts, reflectance, 1.0))
 
 
 @chunk
@@ -38,7 +38,7 @@ def transmittance_dielectric(c: Scalar, eta: Colour) -> Colour:
     parallel = eta2 * c + g
     product = 2.0 * c * g
     passed = safe_divide(product, perpendicular * perpendicular) + safe_divide(product * eta2, parallel * parallel)
-    return jnp.where(eta == 1.0, 1.0, passed)
+    return where(eta == 1.0, 1.0, passed)
 
 
 @chunk
@@ -51,7 +51,7 @@ def fresnel_conductor(c: Scalar, eta: Colour, k: Colour) -> Colour:
     q = jnp.sqrt(jnp.maximum(p * p + 4.0 * nk * nk, 1e-24))
     # a = sqrt((q + p) / 2) cancels where p < 0, as in every metal; there b = sqrt((q - p) / 2) does not and a = nk / b.
     larger = jnp.sqrt(0.5 * (q + jnp.abs(p)))
-    a = jnp.where(p < 0.0, nk / larger, larger)
+    a = where(p < 0.0, nk / larger, larger)
     twice_ac = 2.0 * a * c
     rs = (q + c2 - twice_ac) / jnp.maximum(q + c2 + twice_ac, 1e-12)
     s4 = s2 * s2
@@ -75,7 +75,7 @@ def rarer_cosine(c: Scalar, eta: Colour) -> Colour:
 
     Exact reflectance is the same from both sides of one ray. Approximations are made for light from the rarer medium.
     """
-    return jnp.where(eta >= 1.0, c, safe_sqrt((eta - 1.0) * (eta + 1.0) + c * c) / eta)
+    return where(eta >= 1.0, c, safe_sqrt((eta - 1.0) * (eta + 1.0) + c * c) / eta)
 
 
 def dielectric_f0(eta: Colour) -> Colour:

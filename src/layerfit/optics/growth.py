@@ -6,7 +6,7 @@ come up to its g. Times are in one unit, years where they are a layer's; only th
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_divide, safe_sqrt
+from .._chunk import chunk, clip, safe_divide, safe_sqrt, where
 from .._types import Scalar
 
 
@@ -29,7 +29,7 @@ def coverage(t: Scalar, t0: Scalar, p: Scalar) -> Scalar:
 @chunk
 def grown(theta: Scalar, g: Scalar) -> Scalar:
     """1 where the layer has begun, 0 elsewhere."""
-    return jnp.where(theta > g, 1.0, 0.0).astype(g.dtype)
+    return where(theta > g, 1.0, 0.0).astype(g.dtype)
 
 
 @chunk
@@ -44,7 +44,7 @@ def onset(g: Scalar, t0: Scalar, p: Scalar) -> Scalar:
     """When a place is reached: the inverse of `coverage`."""
     # The field never reaches 0 or 1 but by rounding, where the logarithm would be infinite.
     tiny = float(jnp.finfo(g.dtype).epsneg)
-    begun = -jnp.log1p(-jnp.clip(g, tiny, 1.0 - tiny))
+    begun = -jnp.log1p(-clip(g, tiny, 1.0 - tiny))
     return t0 * jnp.exp(jnp.log(begun) / p)
 
 

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import chunk, struct
+from .._chunk import chunk, clip, struct, where
 from .._types import Colour, Number, Scalar
 from .fresnel import conductor_f0, fresnel_conductor, fresnel_schlick
 
@@ -65,14 +65,14 @@ def fit_lazanyi(eta: Number, k: Number) -> Lazanyi:
     corrected = error(a)
     # Where the correction has the wrong shape for the residual, as for weak absorbers, Schlick's formula is left as it is.
     helps = (plain >= NEGLIGIBLE) & (corrected < plain)
-    return Lazanyi(jnp.where(helps, a, 0.0), alpha, jnp.where(helps, corrected, plain))
+    return Lazanyi(where(helps, a, 0.0), alpha, where(helps, corrected, plain))
 
 
 def _start(c: Any, residual: Any) -> tuple[Colour, Colour]:
     """Amplitude and log exponent of a correction that has the peak of the residual."""
     at = jnp.argmax(jnp.abs(residual), 0)
     peak = jnp.take_along_axis(residual, at[None], 0)[0]
-    place = jnp.clip(c[at], 0.02, 0.9)
+    place = clip(c[at], 0.02, 0.9)
     alpha = 1.0 / place - 1.0
     return peak / (place * (1.0 - place) ** alpha), jnp.log(alpha)
 
@@ -88,7 +88,7 @@ def _step(c: Any, residual: Any, a: Colour, log_alpha: Colour) -> tuple[Colour, 
     ra, rb = jnp.sum(by_a * left, 0), jnp.sum(by_alpha * left, 0)
     determinant = aa * bb - ab * ab
     solved = determinant > 1e-6 * aa * bb
-    safe = jnp.where(solved, determinant, 1.0)
-    da = jnp.where(solved, (ra * bb - rb * ab) / safe, 0.0)
-    db = jnp.where(solved, (rb * aa - ra * ab) / safe, 0.0)
-    return a + da, jnp.clip(log_alpha + jnp.clip(db, -1.0, 1.0), -2.0, 4.0)
+    safe = where(solved, determinant, 1.0)
+    da = where(solved, (ra * bb - rb * ab) / safe, 0.0)
+    db = where(solved, (rb * aa - ra * ab) / safe, 0.0)
+    return a + da, clip(log_alpha + clip(db, -1.0, 1.0), -2.0, 4.0)

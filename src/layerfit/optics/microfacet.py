@@ -13,7 +13,7 @@ from typing import Literal
 import jax
 import jax.numpy as jnp
 
-from .._chunk import chunk, dot, safe_divide, safe_sqrt
+from .._chunk import chunk, dot, safe_divide, safe_sqrt, where
 from .._types import Scalar, Vec3
 
 Distribution = Literal["ggx", "beckmann"]
@@ -59,8 +59,8 @@ def beckmann_by_slopes(stretched_xy2: Scalar, z: Scalar, area: Scalar) -> Scalar
     """Beckmann's density by the squared slope in widths, times z^2, and the product of the widths."""
     # The exponent goes to -infinity at the horizon, where D is 0: the guarded z keeps the derivative finite there.
     above = z > 1e-4
-    z2 = jnp.where(above, z * z, 1.0)
-    return jnp.where(above, jnp.exp(-stretched_xy2 / z2) / (jnp.pi * area * z2 * z2), 0.0)
+    z2 = where(above, z * z, 1.0)
+    return where(above, jnp.exp(-stretched_xy2 / z2) / (jnp.pi * area * z2 * z2), 0.0)
 
 
 def density(distribution: Distribution, h: Vec3, alpha: Width) -> Scalar:

@@ -8,7 +8,7 @@ import math
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, member, safe_divide, safe_sqrt, struct
+from .._chunk import chunk, member, safe_divide, safe_sqrt, struct, where
 from .._types import Colour, Scalar
 
 _GRAZING = 1e-8
@@ -29,12 +29,12 @@ def kubelka_munk(Kx: Colour, Sx: Colour) -> TwoFlux:
     # With z^2 = K (K + 2 S) x^2 in place of Kubelka's b S x nothing is divided by S, and series in z^2 keep the derivatives at K = 0.
     z2 = Kx * (Kx + 2.0 * Sx)
     thin = z2 < 0.1
-    z = jnp.sqrt(jnp.where(thin, 1.0, z2))
-    fall = jnp.where(thin, 1.0, jnp.exp(-z))  # sinh and cosh of a thick layer are kept divided by exp(z), which overflows
+    z = jnp.sqrt(where(thin, 1.0, z2))
+    fall = where(thin, 1.0, jnp.exp(-z))  # sinh and cosh of a thick layer are kept divided by exp(z), which overflows
     sinh_z2 = 1.0 + z2 / 6.0 * (1.0 + z2 / 20.0 * (1.0 + z2 / 42.0 * (1.0 + z2 / 72.0 * (1.0 + z2 / 110.0))))
     cosh_z2 = 1.0 + z2 / 2.0 * (1.0 + z2 / 12.0 * (1.0 + z2 / 30.0 * (1.0 + z2 / 56.0 * (1.0 + z2 / 90.0))))
-    sinh_z = jnp.where(thin, sinh_z2, 0.5 * (1.0 - fall * fall) / z)
-    cosh_z = jnp.where(thin, cosh_z2, 0.5 * (1.0 + fall * fall))
+    sinh_z = where(thin, sinh_z2, 0.5 * (1.0 - fall * fall) / z)
+    cosh_z = where(thin, cosh_z2, 0.5 * (1.0 + fall * fall))
     whole = (Kx + Sx) * sinh_z + cosh_z
     return TwoFlux(Sx * sinh_z / whole, fall / whole)
 
@@ -71,8 +71,8 @@ def saunderson(R: Colour, k1: Colour, k2: Colour) -> Colour:
 def henyey_greenstein(deflection: Scalar, g: Scalar) -> Scalar:
     """Phase function [1/sr] of mean cosine g (Henyey and Greenstein 1941, eq. 2); `deflection` is 1 - cos of the turn, 0 to 2."""
     # 1 + g^2 - 2 g cos as a sum of two positive terms: near its peak, g -> 1 forwards or -1 backwards, the plain form cancels.
-    a = jnp.where(g < 0.0, -g, g)  # not abs, which has no derivative at 0: this has that from above, which is that of the whole
-    spread = (1.0 - a) * (1.0 - a) + 2.0 * a * jnp.where(g < 0.0, 2.0 - deflection, deflection)
+    a = where(g < 0.0, -g, g)  # not abs, which has no derivative at 0: this has that from above, which is that of the whole
+    spread = (1.0 - a) * (1.0 - a) + 2.0 * a * where(g < 0.0, 2.0 - deflection, deflection)
     return (1.0 - a) * (1.0 + a) / (4.0 * math.pi * (spread * jnp.sqrt(spread)))
 
 
@@ -106,8 +106,8 @@ def once_through(phase: Scalar, tau_s: Colour, tau: Colour, path_i: Scalar, path
 def mean_transmittance(x: Colour) -> Colour:
     """(1 - exp(-x)) / x for x >= 0: mean of exp(-x t) over t in [0, 1]."""
     thin = x < 1e-2
-    safe = jnp.where(thin, 1.0, x)
-    return jnp.where(thin, 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))), -jnp.expm1(-safe) / safe)
+    safe = where(thin, 1.0, x)
+    return where(thin, 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))), -jnp.expm1(-safe) / safe)
 
 
 def unscattered(tau: Colour, cosine: Scalar) -> Colour:

@@ -16,10 +16,10 @@ from .._fields import params
 from .._place import TANGENT, Place, needs_tangent
 from ..errors import InputError
 from ..forms import weathering
-from ..forms.precise import BAKED, Precise
+from ..forms.precise import BAKED, HELD, Precise
 from ..optics.lazanyi import fit_lazanyi
 from ..preset import left_out, model_name
-from ..stack import PREPARED, Stack, at, evaluate
+from ..stack import PREPARED, Stack, at, evaluate, prepared
 from .printer import PREFIX, Printer
 
 SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ())}
@@ -112,21 +112,22 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
         declarations = "".join(f"uniform {kind} {name};  // {note}\n" for _, name, kind, note in given)
         values = {name: np.asarray(leaf) for leaf, name, _, _ in given}
         structure = jax.tree.structure(stack)
+        held = _held(stack)
 
         def local(*args: Any) -> Any:
             free = iter(args[: -len(inputs)])
             values = [next(free) if row else leaf for row, leaf in zip(rows, leaves, strict=True)]
             live: Stack = jax.tree.unflatten(structure, values)
-            return shade(live.prepare(), *args[-len(inputs) :])
+            return shade(dataclasses.replace(live.prepare(), **held), *args[-len(inputs) :])
 
         outside = [(leaf, name) for leaf, name, _, _ in given]
     else:
         with jax.enable_x64(False):
-            prepared = jax.tree.map(np.asarray, jax.jit(Stack.prepare)(stack))
-        outside = [(part, f"{PREFIX}{name}") for name, part in _parts(stack, prepared)]
+            made = jax.tree.map(np.asarray, prepared(stack))
+        outside = [(part, f"{PREFIX}{name}") for name, part in _parts(stack, made)]
         declarations = "\n".join(printer.constant(name, part) for part, name in outside)
         values = {}
-        structure = jax.tree.structure(prepared)
+        structure = jax.tree.structure(made)
 
         def local(*args: Any) -> Any:
             live = jax.tree.unflatten(structure, jax.tree.leaves(args[: -len(inputs)]))
@@ -178,6 +179,15 @@ def _parts(stack: Stack, prepared: Any) -> list[tuple[str, Any]]:
         elif value is not None:
             parts.append((f"{stack.base.name}_{field.name}", value))
     return parts
+
+
+def _held(stack: Stack) -> dict[str, Any]:
+    """Parts of the prepared material that are constants also where its other numbers are uniforms."""
+    if not isinstance(stack.form, Precise) or not stack.layers:
+        return {}
+    with jax.enable_x64(False):
+        made = prepared(stack)
+    return {name: jax.tree.map(np.asarray, getattr(made, name)) for name in HELD}
 
 
 def _uniforms(stack: Stack) -> list[tuple[Any, str, str, str] | None]:

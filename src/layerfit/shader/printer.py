@@ -157,6 +157,8 @@ class _Frame:
                         self.left[v] = self.left.get(v, 0) + 1
         self.live.reverse()
         for var, value in zip(jaxpr.constvars, consts, strict=True):
+            if var not in self.left:
+                continue
             row = var.aval.ndim == 1 and var.aval.size > 4
             self.values[var] = (
                 Value(printer.array(np.asarray(value)), "row") if row else Value(literal(value), glsl_type(var.aval))

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_divide, safe_sqrt, static
+from .._chunk import chunk, safe_divide, safe_sqrt, static, where
 from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from ..optics.microfacet import Width
@@ -24,7 +24,7 @@ Scaling = Literal["normalized", "faithful"]
 def cosine_power(one_minus: Scalar, exponent: Scalar) -> Scalar:
     """cos^exponent of an angle by 1 - cos, which keeps the digits of narrow lobes; 0 from a right angle on."""
     inside = one_minus < 0.999999
-    return jnp.where(inside, jnp.exp(exponent * jnp.log1p(-jnp.where(inside, one_minus, 0.0))), 0.0)
+    return where(inside, jnp.exp(exponent * jnp.log1p(-where(inside, one_minus, 0.0))), 0.0)
 
 
 @chunk

@@ -4,7 +4,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_divide, safe_sqrt, static
+from .._chunk import chunk, safe_divide, safe_sqrt, static, where
 from .._fields import choice, layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from .base import Surface
@@ -95,7 +95,7 @@ def oren_nayar_full(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour
     tan_mean = (sin_i + sin_o) / (wi[2] + wo[2])
     smaller = 1.0 - higher
     product = smaller * (1.0 - jnp.minimum(elevation_i, elevation_o))
-    direct = c1 + c2 * jnp.where(dot_xy >= 0.0, forward, backward)
+    direct = c1 + c2 * where(dot_xy >= 0.0, forward, backward)
     direct = direct + aside * c3 * (product * product) * tan_mean
     interreflected = c4 * (1.0 - cos_phi * (smaller * smaller))
     return albedo / jnp.pi * (direct + albedo * interreflected)

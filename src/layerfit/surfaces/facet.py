@@ -5,6 +5,7 @@ from typing import Any, Literal, Self
 
 import jax.numpy as jnp
 
+from .._chunk import clip, where
 from .._fields import choice, derived, param
 from .._types import Colour, Number, Scalar
 from ..optics.fresnel import (
@@ -71,7 +72,7 @@ class Facet(Surface):
         """Its approximation, with the correction where there is one."""
         if self.fresnel == "schlick":
             return fresnel_schlick(c, self.f0)
-        return jnp.clip(fresnel_lazanyi(c, self.f0, self.lazanyi_a, self.lazanyi_alpha), 0.0, 1.0)
+        return clip(fresnel_lazanyi(c, self.f0, self.lazanyi_a, self.lazanyi_alpha), 0.0, 1.0)
 
     def reflectance(self, c: Scalar) -> Colour:
         """Reflectance of a facet, as `fresnel` says."""
@@ -113,7 +114,7 @@ class Clear(Facet):
 
     def approximate(self, c: Colour) -> Colour:
         """That of the rarer side; 0 where the indices match and there is no boundary."""
-        return jnp.where(self.eta == 1.0, 0.0, super().approximate(rarer_cosine(c, self.eta)))
+        return where(self.eta == 1.0, 0.0, super().approximate(rarer_cosine(c, self.eta)))
 
     def fitted(self) -> Self:
         """The same with the constants of its approximation, for the relative index that it has."""

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import jax.numpy as jnp
 
-from .._chunk import static
+from .._chunk import static, where
 from .._fields import choice, layer, param
 from .._place import TANGENT, Place
 from .._types import Colour, Number, Scalar, Vec2, Vec3
@@ -147,5 +147,5 @@ class FlakeLobe(Lobe):
         wi_flake, wo_flake = into_facet(wi, n), into_facet(wo, n)
         lit = (wi_flake[2] > 0.0) & (wo_flake[2] > 0.0)
         D = density("beckmann", into_facet(h, n), width)
-        V = visibility("smith", "beckmann", jnp.where(lit, wi_flake, up), jnp.where(lit, wo_flake, up), width)
-        return jnp.where(lit, D * V, 0.0)
+        V = visibility("smith", "beckmann", where(lit, wi_flake, up), where(lit, wo_flake, up), width)
+        return where(lit, D * V, 0.0)

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_sqrt, static
+from .._chunk import chunk, safe_sqrt, static, where
 from .._fields import layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from ..optics.microfacet import Width
@@ -23,7 +23,7 @@ def lafortune_log_product(wi: Vec3, wo: Vec3, C: Vec3) -> Scalar:
     above_one = 0.5 * ((magnitude - 1.0) * (wi * wi + wo * wo) - magnitude * (apart * apart))
     product = above_one[0] + above_one[1] + above_one[2]
     inside = product > -0.999999
-    return jnp.where(inside, jnp.log1p(jnp.where(inside, product, 0.0)), -1e4)
+    return where(inside, jnp.log1p(where(inside, product, 0.0)), -1e4)
 
 
 @chunk

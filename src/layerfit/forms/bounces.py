@@ -1,0 +1,166 @@
+"""Light that goes to and fro between a rough coat and a metal: how much of it leaves, and where to.
+
+The base sends light up about its mirror direction, as wide as its facets make it; the coat's top lets a part out and reflects the
+rest: all of it, past the edge of total reflection. From cosine to cosine this is a Markov chain, summed once per material. It knows
+no azimuths, so it gives energies, and no constant of it is fitted. Shapes are added: what the coat reflected once, inside the edge,
+leaves as one wider lobe; the rest leaves as the chain says, apart from the cosine of arrival (as in Kulla and Conty 2017, "Revisiting
+physically based shading at Imageworks").
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._chunk import chunk, member, safe_divide, safe_power, safe_sqrt, struct, where
+from .._types import Colour, Scalar
+from ..layers import Coat
+from ..optics.fresnel import fresnel_dielectric
+from ..surfaces.microfacet import Conductor
+from .curves import CELLS, Nodes, P, absorbed, diffuse_return, hemispherical, polynomial, presence
+
+RINGS, SPOKES = 8, 4
+"""Facets that stand for all that light from one direction meets: Gauss over its cone, even over half a turn."""
+
+AGAIN = 0.5751
+"""Power of the coat's width that the lobe of light has which met the base twice: fitted to the random walk."""
+
+
+@struct
+class Curve:
+    """An energy as a polynomial in `grazing`, for each colour."""
+
+    c0: Colour = member("coefficients of the powers of the curves' argument")
+    c1: Colour = member("")
+    c2: Colour = member("")
+    c3: Colour = member("")
+    c4: Colour = member("")
+    c5: Colour = member("")
+    c6: Colour = member("")
+    c7: Colour = member("")
+
+
+@chunk
+def amount(curve: Curve, s: Scalar) -> Colour:
+    """The polynomial at s; an energy is never below 0."""
+    upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7))
+    return jnp.maximum(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0)
+
+
+@chunk
+def wider(alpha: Scalar, coat_alpha: Scalar) -> Scalar:
+    """Width of the lobe of light that met a base of width alpha twice, and the coat in between."""
+    return safe_power(2.0 * safe_power(alpha, P) + AGAIN * safe_power(coat_alpha, P), 1.0 / P)
+
+
+def bounces(nodes: Nodes, alpha: Scalar, coat: Coat, base: Conductor) -> tuple[Curve, Curve]:
+    """Weight of a wider lobe, and fourth root of the rest, over the cosine above; for each colour.
+
+    `alpha` is the width of the coat's GGX facets; `coat` and `base` have relative indices.
+    """
+    if all(jnp.ndim(value) == 0 for value in jax.tree.leaves((base, coat.tau))):
+        return _bounces(nodes, alpha, coat.eta, base, coat.tau)
+    colours = jax.tree.map(lambda value: 0 if jnp.ndim(value) else None, (base, coat.tau))
+    return jax.vmap(lambda base, tau: _bounces(nodes, alpha, coat.eta, base, tau), in_axes=colours)(base, coat.tau)
+
+
+def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor, tau: Scalar | None) -> tuple[Curve, Curve]:
+    # Facets that are met once lose light. Out of diffuse light comes what comes in, over eta^2: of 1 - R that part, the rest is lost.
+    passes = hemispherical(nodes.T) / (eta * eta * (1.0 - diffuse_return(nodes, None)))
+    edge = safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta
+    cells = _cells(edge)
+    aside = 0.5 * nodes.spread / nodes.z
+    first = _added(base.alpha, aside)
+    wide = _added(wider(base.alpha, alpha), aside)
+    bare = jnp.broadcast_to(base.alpha, cells.shape)
+    top = jnp.broadcast_to(jnp.maximum(alpha * presence(eta), 1e-3), cells.shape)
+
+    # All at once, for the compiler's sake: light between base and top; light from above; that light in one wider lobe; the top from below.
+    begins = jnp.concatenate([cells, nodes.z, nodes.z, cells])
+    c, z, weight = jax.vmap(_facets)(begins, jnp.concatenate([bare, first, wide, top]))
+    into = _into(z, edge)
+    up, down = slice(0, -len(cells)), slice(-len(cells), None)
+
+    # In sight as facets of the base are, which loses nothing but light that is sent into others; the lobe as it is evaluated.
+    sight = _lambda(begins[up, None], jnp.concatenate([bare, jnp.broadcast_to(base.alpha, first.shape), wide])[:, None])
+    shadow = _lambda(begins[up, None], base.alpha) + _lambda(z[up], base.alpha)
+    energy = weight[up] * jax.vmap(jax.vmap(base.reflectance))(c[up]) * ((1.0 + sight) / (1.0 + shadow))
+    back = into[up] @ nodes.R
+    once = 1.0 if tau is None else jnp.exp(-safe_divide(tau, z[up]))
+    leaves = jnp.sum(energy * once * passes * (1.0 - back), -1)
+    returns = energy * once * once * back
+    inside = returns * safe_sqrt(jnp.minimum((1.0 - back) / (1.0 - nodes.R[-1]), 1.0))
+
+    masked = _lambda(begins[down, None], top[:, None]) + _lambda(z[down], top[:, None])
+    share = weight[down] * jax.vmap(jax.vmap(lambda c: fresnel_dielectric(c, 1.0 / eta)))(c[down]) / (1.0 + masked)
+    share = share / jnp.maximum(jnp.sum(share, -1, keepdims=True), 1e-12)
+    turn = jnp.einsum("ns,nsk->nk", share, into[down])
+
+    n, m = len(cells), len(cells) + len(nodes.z)
+    chain = jnp.einsum("ns,nsk->nk", returns[:m], into[:m]) @ turn
+    total = _sum_of_powers(chain[:n], leaves[:n])
+    lobe = jnp.einsum("ns,nsk->nk", inside[n:m], into[n:m]) @ (turn @ leaves[:n])
+    rest = jnp.maximum(chain[n:] @ total - lobe, 0.0)
+    kept = 1.0 if tau is None else jax.vmap(lambda path, theta: absorbed(path, theta, tau))(nodes.path, nodes.theta)
+    norm = hemispherical(nodes.T * kept * rest) / (eta * eta)
+    weight = lobe / jnp.maximum(base.f0 * leaves[m:], 1e-9)
+    # Once more the root: over a smooth base the rest falls a hundredfold from grazing to normal light, too far for a polynomial.
+    root = safe_sqrt(rest / jnp.sqrt(jnp.maximum(norm, 1e-12)))
+    return Curve(*polynomial(weight)), Curve(*polynomial(root))
+
+
+def _added(alpha: Scalar, aside: Float[Array, " m"]) -> Float[Array, " m"]:
+    return safe_power(safe_power(alpha, P) + safe_power(aside, P), 1.0 / P)
+
+
+def _cells(edge: Scalar) -> Float[Array, " k"]:
+    """Cosines from 0 to the edge of total reflection and from there to 1, even in each."""
+    k = np.arange(2 * CELLS + 1) / CELLS
+    outside = jnp.asarray(np.minimum(k, 1.0), edge.dtype)
+    inside = jnp.asarray(np.maximum(k - 1.0, 0.0), edge.dtype)
+    return jnp.maximum(outside * edge + inside * (1.0 - edge), 1e-3)
+
+
+def _into(z: Float[Array, "n s"], edge: Scalar) -> Float[Array, "n s k"]:
+    """How light at cosines z is shared among the two cells next to it: linear weights, on a last axis."""
+    place = where(z < edge, safe_divide(z, edge), 1.0 + (z - edge) / (1.0 - edge))
+    return jnp.maximum(1.0 - jnp.abs(CELLS * place[..., None] - jnp.asarray(np.arange(2 * CELLS + 1), z.dtype)), 0.0)
+
+
+def _sum_of_powers(M: Float[Array, "k k"], x: Float[Array, " k"]) -> Float[Array, " k"]:
+    """x + M x + M^2 x + ... of 32 terms: light has left or is absorbed long before."""
+    for _ in range(5):
+        x = x + M @ x
+        M = M @ M
+    return x
+
+
+def _facets(z: Scalar, alpha: Scalar) -> tuple[Float[Array, " s"], Float[Array, " s"], Float[Array, " s"]]:
+    """Facets in sight of a direction: cosine to it, cosine of the reflected light, and weight.
+
+    Visible GGX normals by spherical caps (Dupuy and Benyoub 2023), at the nodes of a quadrature; light sent down weighs nothing.
+    """
+    u, du = np.polynomial.legendre.leggauss(RINGS)
+    phi = (np.arange(SPOKES) + 0.5) * np.pi / SPOKES
+    ring = jnp.asarray(np.repeat(0.5 * (u + 1.0), SPOKES), z.dtype)
+    weight = jnp.asarray(np.repeat(0.5 * du / SPOKES, SPOKES), z.dtype)
+    cos_phi, sin_phi = (jnp.asarray(np.tile(f(phi), RINGS), z.dtype) for f in (np.cos, np.sin))
+    s = safe_sqrt((1.0 - z) * (1.0 + z))
+    stretched = 1.0 / jnp.sqrt(alpha * alpha * s * s + z * z)
+    wx, wz = alpha * s * stretched, z * stretched
+    cap = (1.0 - ring) * (1.0 + wz) - wz
+    radius = safe_sqrt((1.0 - cap) * (1.0 + cap))
+    hx, hy, hz = alpha * (radius * cos_phi + wx), alpha * radius * sin_phi, cap + wz
+    length = jnp.sqrt(hx * hx + hy * hy + hz * hz)
+    c = (hx * s + hz * z) / length
+    out = 2.0 * c * hz / length - z
+    above = out > 1e-3
+    return c, where(above, out, 1.0), where(above, weight, 0.0)
+
+
+def _lambda(z: Any, alpha: Any) -> Any:
+    """Lambda of the GGX distribution (Heitz 2014, eq. 72), by the cosine."""
+    x = alpha * alpha * ((1.0 - z) * (1.0 + z) / (z * z))
+    return 0.5 * x / (1.0 + jnp.sqrt(1.0 + x))
