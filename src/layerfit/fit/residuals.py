@@ -55,7 +55,7 @@ def _advance(u: Any, state: Any, bounds: Any, total: Any, *, free: Parametrisati
     return u, state
 
 
-_derivatives = Compiled(_material, ("free",), optimise=False)
+_derivatives = Compiled(_material, ("free",))
 _block_columns = Compiled(_columns, ("form",))
 _solver_step = Compiled(_advance, ("free", "solver"))
 
