@@ -5,6 +5,7 @@ from typing import Any, Self
 
 import jax.numpy as jnp
 
+from .._chunk import clip
 from .._fields import derived, layer, param
 from .._types import Colour, Number, Scalar
 from ..errors import InputError
@@ -60,15 +61,26 @@ def baked_f0(film: Baked, c: Scalar) -> Colour:
     return film.film_0 + s * total - older
 
 
-# A colour of interference may lie outside of Rec.709: what is less than nothing, or more than all, is not kept.
+DARKEST = 0.0025
+"""Least reflectance of a channel, about the polynomial's own error. A saturated colour of interference lies outside of Rec.709 and its
+channel passes through 0; a hard edge there would have neither a derivative beyond it nor a digit near it."""
+
+
+def _lift(reflected: Colour) -> Colour:
+    """What is added to a reflectance so that it ends smoothly at the darkest: nothing from twice that on."""
+    below = 1.0 - clip(reflected * (0.5 / DARKEST), 0.0, 1.0)
+    return DARKEST * (below * below)
+
+
 def film_reflects(c: Scalar, f0: Colour) -> Colour:
     """Light that a film reflects at the cosine `c`."""
-    return jnp.clip(fresnel_schlick(c, f0), 0.0, 1.0)
+    reflected = fresnel_schlick(c, f0)
+    return clip(reflected, 0.0, 1.0) + _lift(reflected)
 
 
 def film_passes(c: Scalar, f0: Colour) -> Colour:
     """The rest, with its own digits at grazing angles."""
-    return jnp.clip((1.0 - f0) * schlick_complement(c), 0.0, 1.0)
+    return clip((1.0 - f0) * schlick_complement(c), 0.0, 1.0) - _lift(fresnel_schlick(c, f0))
 
 
 class Filmed(Baked, Facet):
