@@ -8,6 +8,7 @@ import pytest
 from helpers import COPPER, FLOOR, REL, STACKS, cases, close, direction, hemisphere, varnish
 from layerfit._place import Place
 from layerfit.errors import InputError
+from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.layers import Coat
 from layerfit.optics.flakes import flake_tilt, into_facet, kept_tilt, tilted_normal
@@ -144,6 +145,24 @@ def test_pigment_and_coverage_share_the_area():
 
 def test_the_shader_of_elek_draws_the_same_flakes(gl):
     assert check_pairs(print_material(ELEK, "Elek"), 20000).passed
+
+
+NARROW = {
+    f"{alpha}, {name}": Stack(coats, Flakes(alpha=alpha, lost=lost, **COPPER), form)
+    for alpha in (0.01, 0.02, 0.035)
+    for name, coats, lost, form in (
+        ("bare", (), "roughness", Corrected()),
+        ("coated", (CLEAR,), "roughness", Corrected()),
+        ("Elek", (), "nothing", Corrected()),
+    )
+}
+"""A tilt that is off by a millionth of it moves a narrow lobe by a part of its width."""
+
+
+@pytest.mark.parametrize("name", NARROW)
+def test_the_shader_draws_narrow_flakes(gl, name):
+    parity = check_pairs(print_material(NARROW[name], name), 65536)
+    assert parity.passed, parity
 
 
 def test_the_shader_asks_for_what_flakes_need():

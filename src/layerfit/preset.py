@@ -193,9 +193,9 @@ def _layer(document: Any, kinds: Mapping[str, Any], where: str) -> Any:
     for group in getattr(cls, "together", ()):
         if missing := [key for key in group if key not in values] if any(key in values for key in group) else []:
             raise InputError(f"{where}: {', '.join(group)} come together; {', '.join(missing)} is missing")
-    for key, other in getattr(cls, "only_with", {}).items():
-        if key in values and other not in values:
-            raise InputError(f"{where}: {key} belongs to {other}, which is not there: leave it out or give both")
+    for key, others in getattr(cls, "only_with", {}).items():
+        if missing := [other for other in others if other not in values] if key in values else []:
+            raise InputError(f"{where}: {key} belongs to {missing[0]}, which is not there: leave it out or give both")
     made = cls(**values)
     if problem := getattr(made, "film_problem", None):
         raise InputError(f"{where}: {problem}")

@@ -50,6 +50,15 @@ def kept_tilt(distance: Scalar, half_distance: Scalar) -> Scalar:
 
 
 @chunk
+def lost_variance(distance: Scalar, half_distance: Scalar) -> Scalar:
+    """Part of the variance of tilts that is not drawn flake by flake: 1 - kept_tilt^2, with its own digits near by."""
+    ratio = distance / half_distance
+    ratio2 = ratio * ratio
+    kept = 1.0 / (1.0 + ratio2)
+    return ratio2 * kept * (1.0 + kept)
+
+
+@chunk
 def into_facet(w: Vec3, n: Vec3) -> Vec3:
     """A direction in a frame whose z is n: half a turn about the vector halfway between n and the normal (0, 0, 1)."""
     m = n + jnp.array([0.0, 0.0, 1.0], n.dtype)

@@ -9,12 +9,30 @@ from .._chunk import static, where
 from .._fields import choice, layer, param
 from .._place import TANGENT, Place
 from .._types import Colour, Number, Scalar, Vec2, Vec3
-from ..optics.flakes import flake_tilt, into_facet, kept_tilt, tilted_d, tilted_normal
+from ..optics.flakes import flake_tilt, into_facet, kept_tilt, lost_variance, tilted_d, tilted_normal
 from ..optics.microfacet import Width, density, visibility
 from .base import Lobe, Surface, variance
 from .diffuse import Lambert
 from .facet import Metal, metal_eta, metal_k
 from .microfacet import alpha_param
+
+
+def per_uv_param(default: float | None) -> Any:
+    """Declare how many flakes there are."""
+    doc = "flakes along one unit of the texture coordinates"
+    return param(default=default, lower=1.0, upper=1e6, scale="log", fitted=False, doc=doc)
+
+
+def half_distance_param(default: float | None) -> Any:
+    """Declare how far they are seen."""
+    doc = "distance at which half of the tilt is drawn, in the scene's unit"
+    return param(default=default, lower=1e-6, upper=1e6, scale="log", fitted=False, doc=doc)
+
+
+def seed_param(default: float | None) -> Any:
+    """Declare which flakes they are."""
+    doc = "whole number; another one, other flakes"
+    return param(default=default, lower=0.0, upper=2**24 - 1, scale="linear", fitted=False, doc=doc)
 
 
 @layer
@@ -49,20 +67,9 @@ class Flakes(Metal):
     albedo: Number = param(
         default=None, lower=0.0, upper=1.0, scale="linear", doc="light that the pigment between flakes sends back", colour=True
     )
-    per_uv: Number = param(
-        default=400.0, lower=1.0, upper=1e6, scale="log", fitted=False, doc="flakes along one unit of the texture coordinates"
-    )
-    half_distance: Number = param(
-        default=1.0,
-        lower=1e-6,
-        upper=1e6,
-        scale="log",
-        fitted=False,
-        doc="distance at which half of the tilt is drawn, in the scene's unit",
-    )
-    seed: Number = param(
-        default=0.0, lower=0.0, upper=2**24 - 1, scale="linear", fitted=False, doc="whole number; another one, other flakes"
-    )
+    per_uv: Number = per_uv_param(400.0)
+    half_distance: Number = half_distance_param(1.0)
+    seed: Number = seed_param(0.0)
     lost: str = choice(default="roughness", others=("nothing",), doc="what becomes of the tilt that is not drawn")
 
     @property
@@ -82,7 +89,7 @@ class Flakes(Metal):
         """The flake at a place of the surface."""
         kept = kept_tilt(place.distance, self.half_distance)
         tilt = flake_tilt(place.uv, self.per_uv, self.sigma * kept, self.seed.astype(jnp.uint32))
-        return Flake(self, tilt, kept)
+        return Flake(self, tilt, lost_variance(place.distance, self.half_distance))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,8 +98,8 @@ class Flake(Surface):
 
     paint: Flakes
     tilt: Vec2
-    kept: Scalar
-    """Part s of the tilt that is drawn."""
+    lost: Scalar
+    """Part 1 - s^2 of the variance of tilts that is not drawn."""
 
     @property
     def diffuse(self) -> Any:
@@ -133,8 +140,7 @@ class FlakeLobe(Lobe):
     def _among_others(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None, flake: Flake) -> Scalar:
         """The lobe about a flake. Flakes hide one another by the slopes of all: the mean over flakes is the lobe seen from afar."""
         alpha, sigma2 = self.paint.alpha, self.paint.sigma * self.paint.sigma
-        drawn = flake.kept * flake.kept
-        alpha2 = alpha * alpha + (1.0 - drawn) * sigma2 if width is None else variance(width) - drawn * sigma2
+        alpha2 = alpha * alpha + flake.lost * sigma2 if width is None else variance(width) - (1.0 - flake.lost) * sigma2
         D = tilted_d(h, flake.tilt, jnp.sqrt(alpha2))
         slopes = self.width if width is None else width
         V = visibility("smith", "beckmann", wi, wo, slopes)

@@ -90,7 +90,7 @@ class Lafortune(TwoParts):
     """
 
     together: ClassVar = (("ks_2", "cx_2", "cz_2", "exponent_2"), ("ks_3", "cx_3", "cz_3", "exponent_3"))
-    only_with: ClassVar = {"cy_2": "ks_2", "cy_3": "ks_3"}
+    only_with: ClassVar = {"cy_2": ("ks_2",), "cy_3": ("ks_3",)}
 
     name: str = static(default="base", doc="name of the layer")
     kd: Number = kd_param()

@@ -45,7 +45,7 @@ class KubelkaMunk(Surface):
     """
 
     together: ClassVar = (("kx_2", "sx_2"), ("kx_3", "sx_3"))
-    only_with: ClassVar = {"kx_3": "kx_2"}
+    only_with: ClassVar = {"kx_3": ("kx_2",)}
     gauges: ClassVar = _gauges()
     """Pairs of fields that an image cannot tell apart: as the first grows, the second with it (1) or against it (-1); and why."""
 
