@@ -24,6 +24,9 @@ in vec2 v_uv;        // texture coordinates
 out vec4 color;
 
 uniform vec3 u_eye;
+//@ if sky
+uniform vec3 u_up;  // where the sky is, a unit vector
+//@ end
 uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
 uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
 
@@ -39,6 +42,9 @@ void main() {
 //@ end
 //@ if distance
     float distance = length(u_eye - v_position);  // in the unit of the space above
+//@ end
+//@ if sky
+    float sky = 0.5 + 0.5 * dot(n, u_up);  // part of it that is seen in the open; times ambient occlusion, where you have it
 //@ end
     vec3 radiance = vec3(0.0);
     for (int k = 0; k < LF_LIGHTS; ++k) {

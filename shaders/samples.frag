@@ -9,6 +9,9 @@ in vec2 v_uv;
 //@ if distance
 in float v_distance;
 //@ end
+//@ if sky
+in float v_sky;
+//@ end
 out vec4 color;
 
 void main() {
@@ -17,6 +20,9 @@ void main() {
 //@ end
 //@ if distance
     float distance = v_distance;
+//@ end
+//@ if sky
+    float sky = v_sky;
 //@ end
     color = vec4(lf_evaluate(v_wi, v_wo@THERE@) * v_weight, 1.0);
 }

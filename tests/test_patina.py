@@ -21,7 +21,7 @@ from layerfit.fit.result import parameters, unidentified
 from layerfit.forms import patina
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
-from layerfit.forms.growth import Cover
+from layerfit.forms.growth import Cover, aged_at, cover_at
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat, Patina
 from layerfit.materials.patina import copper_patina
@@ -123,6 +123,8 @@ PATINAS = {
     "crust": Stack((Patina(softness=0.1, eta=1.7, **CRUST),), METAL),
     "trapped light": Stack((Patina(softness=0.1, tau=0.3),), METAL, Corrected(trapped=True)),
     "faithful": Stack((Patina(softness=0.1, tau=0.3, masking="vcavity", **ONCE),), METAL, Faithful()),
+    "exposed": Stack((Patina(softness=0.05, exposure=0.7, tau=[0.5, 1.0, 2.0], **CRUST),), METAL),
+    "exposed, with a hard edge": Stack((Patina(exposure=1.0, tau=0.3),), METAL),
 }
 
 
@@ -130,7 +132,7 @@ PATINAS = {
 def rows():
     """Pairs of directions at places of the surface."""
     uv = np.random.default_rng(0).uniform(-2.0, 2.0, (256, 2))
-    return hemisphere(256, 1), hemisphere(256, 2), Place(uv)
+    return hemisphere(256, 1), hemisphere(256, 2), Place(uv, sky=np.linspace(0.0, 1.0, 256))
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
@@ -219,6 +221,68 @@ def test_the_mean_over_the_surface_is_near_the_mean_of_its_places():
         stack = Stack((dataclasses.replace(PATINAS["all"].layers[0], years=years),), METAL)
         pixels = lambda where, stack=stack: predict(stack, wi[:, None], wo, np.ones_like(wi)[:, None], where)  # noqa: E731
         np.testing.assert_allclose(pixels(None)[::many], pixels(place).reshape(8, many, 3).mean(1), rtol=0.06)
+
+
+EXPOSED = ["exposed", "exposed, with a hard edge"]
+
+
+def changed(stack, **fields):
+    """The same patina but for some fields, in float64."""
+    return dataclasses.replace(stack, layers=(dataclasses.replace(stack.layers[0], **fields),)).astype(np.float64)
+
+
+@pytest.mark.parametrize("name", EXPOSED)
+def test_a_place_ages_by_what_it_sees_of_the_sky(name, rows):
+    """In the open like one that is not told of the sky; elsewhere, and in the mean, like a younger one."""
+    wi, wo, place = rows
+    exposure, years = PATINAS[name].layers[0].exposure, PATINAS[name].layers[0].years
+    stack = changed(PATINAS[name])
+    for sky in (1.0, 0.3, None):
+        younger = changed(stack, exposure=None, years=years * (1.0 - exposure * (1.0 - (0.5 if sky is None else sky))))
+        there = None if sky is None else Place(place.uv, sky=np.full(len(wi), sky))
+        np.testing.assert_allclose(brdf(stack, wi, wo, there), brdf(younger, wi, wo, there), rtol=1e-12)
+
+
+def test_more_of_the_sky_more_patina():
+    growth = changed(PATINAS["exposed"]).prepare().growth
+    g = jnp.float64(0.5)
+    shares = [float(cover_at(g, aged_at(growth, sky)).covered) for sky in (0.0, 0.5, 1.0)]
+    assert shares[0] < 0.2 < shares[1] < shares[2]
+    assert shares[2] > 0.9
+
+
+def test_what_never_sees_the_sky_stays_bare(rows):
+    """Where all growth needs it."""
+    wi, wo, place = rows
+    stack = changed(PATINAS["exposed, with a hard edge"])
+    shut = Place(place.uv, sky=np.zeros(len(wi)))
+    np.testing.assert_allclose(brdf(stack, wi, wo, shut), brdf(Stack((), METAL).astype(np.float64), wi, wo), rtol=1e-14)
+
+
+def test_a_place_that_does_not_tell_of_the_sky_is_refused(rows):
+    wi, wo, place = rows
+    with pytest.raises(InputError, match="reads uv, sky of a place of the surface, and of this one there is no sky"):
+        brdf(PATINAS["exposed"], wi, wo, Place(place.uv))
+    assert PATINAS["all"].reads == ("uv",)
+    assert "sky" not in print_material(PATINAS["all"], "all").text()
+
+
+def test_derivatives_of_exposure_agree_with_differences(rows):
+    wi, wo, uv, sky = (jnp.asarray(x[:16]) for x in (rows[0], rows[1], rows[2].uv, rows[2].sky))
+    stack = changed(PATINAS["exposed"])
+
+    def value(exposure, sky):
+        there = dataclasses.replace(stack.layers[0], exposure=exposure)
+        return brdf(dataclasses.replace(stack, layers=(there,)), wi, wo, Place(uv, sky=sky))
+
+    both = Compiled(lambda point, step: jax.jvp(value, point, step))
+    point, h = (stack.layers[0].exposure, sky), 1e-6
+    for step in ((jnp.ones_like(point[0]), jnp.zeros_like(sky)), (jnp.zeros_like(point[0]), jnp.ones_like(sky))):
+        moved = [both(tuple(x + s * h * d for x, d in zip(point, step, strict=True)), step)[0] for s in (1.0, -1.0)]
+        slope = np.asarray(both(point, step)[1])
+        assert np.all(np.isfinite(slope))
+        assert np.max(np.abs(slope)) > 1e-3
+        np.testing.assert_allclose(slope, (moved[0] - moved[1]) / (2.0 * h), rtol=1e-5, atol=1e-8)
 
 
 def _rows(stack, wi, wo, uv):

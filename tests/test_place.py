@@ -171,3 +171,12 @@ def test_pixels_that_need_their_place_are_fitted_there(painted):
         starts=1,
     )
     np.testing.assert_allclose(result.stack.base.albedo, [0.5, 0.28, 0.13], rtol=1e-3)
+
+
+def test_a_picture_knows_how_much_of_the_sky_is_seen(painted):
+    """All of it where a sphere faces up, none where it faces down."""
+    (view,) = load(read_scene(painted))
+    up = np.array(view.reference.camera.up) / np.linalg.norm(view.reference.camera.up)
+    sky = view.samples().place.sky
+    np.testing.assert_allclose(sky, 0.5 + 0.5 * view.normal @ up, rtol=1e-6)
+    assert sky.max() - sky.min() > 0.3

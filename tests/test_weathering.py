@@ -29,6 +29,7 @@ VERDIGRIS = Overgrowth("verdigris", softness=0.05, K_per_mm=[20.0, 2.0, 6.0], S_
 HISTORIES = {
     "all steps": Stack((Polish(height_um=8.0, strength=0.6), Erosion(amount_um=4.0), VERDIGRIS, TARNISH), METAL),
     "one deposit": Stack((Deposit(),), METAL),
+    "exposed": Stack((dataclasses.replace(VERDIGRIS, exposure=0.8),), METAL),
 }
 
 
@@ -106,7 +107,7 @@ def test_a_history_is_reciprocal_and_keeps_its_energy(name):
     each = Compiled(brdf)
     u, v = (np.arange(4096) + 0.5) / 4096, (np.arange(4096) * 0.618033988749895) % 1.0
     x, y = np.sqrt(u) * np.cos(2.0 * np.pi * v), np.sqrt(u) * np.sin(2.0 * np.pi * v)
-    wo, place = np.stack([x, y, np.sqrt(1.0 - u)], -1), Place(np.full((4096, 2), 0.3))
+    wo, place = np.stack([x, y, np.sqrt(1.0 - u)], -1), Place(np.full((4096, 2), 0.3), sky=np.full(4096, 0.6))
     for theta in (5.0, 70.0):
         wi = np.broadcast_to(direction(theta), wo.shape)
         there = np.asarray(each(stack, wi, wo, place))
@@ -119,7 +120,8 @@ def test_parity_of_a_history(gl, name):
     shader = print_material(HISTORIES[name], "test")
     parity = check_pairs(shader, 16384)
     assert parity.passed, parity
-    assert ("vec2 uv" in shader.functions) == (name == "all steps")
+    assert ("vec2 uv" in shader.functions) == (name != "one deposit")
+    assert ("float sky" in shader.functions) == (name == "exposed")
     assert "form" not in shader.text().partition("\n//\n")[0]
 
 
@@ -151,6 +153,14 @@ def test_a_history_has_finite_derivatives_at_its_edges(dtype):
         found, slopes = slopes_of(inputs, jax.tree.map(jnp.ones_like, inputs))
         assert np.all(np.isfinite(found))
         assert np.all(np.isfinite(slopes))
+
+
+def test_what_sees_less_of_the_sky_is_younger():
+    exposed = HISTORIES["exposed"]
+    younger = dataclasses.replace(VERDIGRIS, years=VERDIGRIS.years * (1.0 - 0.8 * 0.75))
+    uv = np.random.default_rng(0).uniform(-1.0, 1.0, (64, 2))
+    there = values(exposed, Place(uv, sky=np.full(64, 0.25)))
+    np.testing.assert_allclose(there, values(Stack((younger,), METAL), Place(uv)), rtol=1e-12)
 
 
 def test_a_history_is_written_and_read():

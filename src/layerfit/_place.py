@@ -8,6 +8,7 @@ import dataclasses
 from typing import Any
 
 from ._chunk import struct
+from .errors import InputError
 
 
 @struct
@@ -18,6 +19,8 @@ class Place:
     """Texture coordinates, (2,) or (n, 2)."""
     distance: Any = None
     """To the viewer, () or (n,), in the unit of the material's own distances."""
+    sky: Any = None
+    """Part of the sky that is seen from there, () or (n,), 0 to 1: (1 + n . up) / 2 in the open, times ambient occlusion."""
 
 
 INPUTS = tuple(field.name for field in dataclasses.fields(Place))
@@ -37,8 +40,13 @@ def needs(*layers: Any) -> tuple[str, ...]:
 
 
 def narrowed(place: Place | None, names: tuple[str, ...]) -> Place | None:
-    """A place with these of its parts alone; None where there are none."""
-    return Place(**{name: getattr(place, name) for name in names}) if names and place is not None else None
+    """A place with these of its parts alone; None where there are none. Raises `InputError` for one that is not known."""
+    if not names or place is None:
+        return None
+    if missing := [name for name in names if getattr(place, name) is None]:
+        told = f"the material reads {', '.join(names)} of a place of the surface"
+        raise InputError(f"{told}, and of this one there is no {', '.join(missing)}: give Place all of them")
+    return Place(**{name: getattr(place, name) for name in names})
 
 
 ORIENTED = ("alpha_x", "cy", "cy_2", "cy_3")

@@ -45,7 +45,8 @@ class Samples:
     """Row-major place of each pixel in the image."""
     shape: tuple[int, int]
     place: Place | None = None
-    """Where on the surface each pixel is: texture coordinates (pixels, 2) where there are any, distance to the camera (pixels,)."""
+    """Where on the surface each pixel is: texture coordinates (pixels, 2) where there are any, distance to the camera
+    and part of the sky that is seen, both (pixels,)."""
 
     @property
     def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, Place | None]:
@@ -128,7 +129,9 @@ class View:
     def _place(self, which: np.ndarray) -> Place:
         away = np.asarray(self.reference.camera.position) - self.position[which]
         uv = None if self.uv is None else self.uv[which].astype(np.float32)
-        return Place(uv, np.linalg.norm(away, axis=-1).astype(np.float32))
+        up = normalise(np.asarray(self.reference.camera.up, float))
+        sky = 0.5 * (1.0 + self.normal[which] @ up)
+        return Place(uv, np.linalg.norm(away, axis=-1).astype(np.float32), sky.astype(np.float32))
 
 
 def load(scene: Scene, min_cosine: float | None = None) -> list[View]:

@@ -2,17 +2,21 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import jax.numpy as jnp
 
 from .._chunk import chunk, member, struct
 from .._types import Scalar, Vec2
 from ..layers.growing import Growing
-from ..optics.growth import coverage, grown, partly_grown
+from ..optics.growth import coverage, exposed_part, grown, partly_grown
 from ..optics.noise import fbm
 
 # Standard deviation of fbm, measured on 10^6 places; its mean is one half, by symmetry.
 FIELD_SPREAD = 0.139
+
+MEAN_SKY = 0.5
+"""What a surface of no known place sees: the mean over all directions that it may face."""
 
 
 @struct
@@ -25,13 +29,27 @@ class Growth:
     softness: Scalar | None = member("width of the edge, in the unit of the field")
     cells: Scalar = member("cells of the coarsest noise in a unit of texture")
     seed: Scalar = member("which noise: a whole number")
+    exposure: Any = member("part of the growth that needs the open sky")
 
 
 def growth_of(layer: Growing) -> Growth:
     """What is computed once of a layer that grows."""
     age = layer.years / layer.onset_years
     theta = coverage(age, jnp.ones_like(age), layer.steepness)
-    return Growth(theta, age, layer.steepness, layer.softness, layer.cells, layer.seed)
+    return Growth(theta, age, layer.steepness, layer.softness, layer.cells, layer.seed, layer.exposure)
+
+
+def aged_at(growth: Growth, sky: Scalar | float) -> Growth:
+    """The growth of a place that sees so much of the sky."""
+    return growth if growth.exposure is None else aged_under(growth, jnp.asarray(sky, growth.age.dtype))
+
+
+@chunk
+def aged_under(growth: Growth, sky: Scalar) -> Growth:
+    """Growth where so much of the sky is seen: its age is what is felt there."""
+    age = growth.age * exposed_part(sky, growth.exposure)
+    theta = coverage(age, jnp.ones_like(age), growth.steepness)
+    return dataclasses.replace(growth, theta=theta, age=age)
 
 
 @chunk

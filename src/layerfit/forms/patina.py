@@ -22,7 +22,7 @@ from ..optics.medium import refract_about_normal
 from ..optics.scattering import henyey_greenstein, kubelka_munk, scattered_back
 from ..surfaces import Conductor
 from . import corrected, faithful
-from .growth import Cover, Growth, cover_at, field_at, growth_of, mean_cover
+from .growth import MEAN_SKY, Cover, Growth, aged_at, cover_at, field_at, growth_of, mean_cover
 
 FORMS = {corrected.Corrected: corrected, faithful.Faithful: faithful}
 """What the film can be computed in."""
@@ -62,9 +62,10 @@ class Prepared:
 
     def at(self, place: Place) -> "Prepared":
         """The patina of one place."""
-        g = field_at(place.uv, self.growth)
-        cover = cover_at(g, self.growth)
-        thickness = thickness_at(g, self.growth, self.crust.blur)
+        growth = aged_at(self.growth, place.sky)
+        g = field_at(place.uv, growth)
+        cover = cover_at(g, growth)
+        thickness = thickness_at(g, growth, self.crust.blur)
         return dataclasses.replace(self, spot=Spot(cover, thickness))
 
 
@@ -78,8 +79,9 @@ def thickness_at(g: Scalar, growth: Growth, blur: Scalar) -> Scalar:
 
 def mean_spot(prepared: Prepared) -> Spot:
     """What stands for a whole surface: the mean of what is covered, as thick as where the field has its mean of that."""
-    cover, g = mean_cover(prepared.growth)
-    return Spot(cover, thickness_at(g, prepared.growth, prepared.crust.blur))
+    growth = aged_at(prepared.growth, MEAN_SKY)
+    cover, g = mean_cover(growth)
+    return Spot(cover, thickness_at(g, growth, prepared.crust.blur))
 
 
 def grows(layers: tuple[Any, ...]) -> bool:

@@ -21,7 +21,7 @@ from ..optics.fresnel import transmittance_dielectric
 from ..optics.scattering import kubelka_munk, kubelka_munk_over
 from ..surfaces import Conductor, Dielectric, Lambert
 from . import corrected
-from .growth import Growth, cover_at, field_at, growth_of, mean_cover
+from .growth import MEAN_SKY, Growth, aged_at, cover_at, field_at, growth_of, mean_cover
 
 # A layer thinner than about a wavelength has no boundary of its own; this makes what lies open a smooth function of the thicknesses.
 SKIN_UM = 0.5
@@ -55,8 +55,13 @@ class Prepared:
 
     def at(self, place: Place) -> "Prepared":
         """The history of one place."""
-        covered = tuple(growth and cover_at(field_at(place.uv, growth), growth).covered for growth in self.growths)
+        covered = tuple(growth and covered_at(place, growth) for growth in self.growths)
         return dataclasses.replace(self, covered=covered)
+
+
+def covered_at(place: Place, growth: Growth) -> Scalar:
+    """Part of a place that what grows there covers."""
+    return cover_at(field_at(place.uv, growth), aged_at(growth, place.sky)).covered
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,7 +169,7 @@ def history(prepared: Prepared) -> Lies:
         elif growth is None:
             stack = coat(stack, step, step.thickness)
         else:
-            part = mean_cover(growth)[0].covered if covered is None else covered
+            part = mean_cover(aged_at(growth, MEAN_SKY))[0].covered if covered is None else covered
             stack = coat(stack, step, part * step.thickness)
     return stack
 

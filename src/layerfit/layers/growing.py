@@ -36,6 +36,16 @@ class Growing:
         default=8.0, lower=0.01, upper=1e4, scale="log", doc="cells of the coarsest noise in a unit of texture", fitted=False
     )
     seed: Number = param(default=0.0, lower=0.0, upper=65535.0, scale="linear", doc="which noise: a whole number", fitted=False)
+    exposure: Number = param(
+        default=None,
+        lower=0.0,
+        upper=1.0,
+        scale="linear",
+        fitted=False,
+        doc="part of the growth that needs the open sky: rain and light; absent: every place grows alike",
+    )
 
-    reads = ("uv",)
-    """What it needs to know of a place of the surface."""
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """What it needs to know of a place of the surface."""
+        return ("uv",) if self.exposure is None else ("uv", "sky")

@@ -21,6 +21,12 @@ def softplus(x: Scalar) -> Scalar:
 
 
 @chunk
+def exposed_part(sky: Scalar, exposure: Scalar) -> Scalar:
+    """Part of the age that a place feels which sees so much of the sky: from 1 in the open to 1 - exposure."""
+    return 1.0 - exposure * (1.0 - sky)
+
+
+@chunk
 def coverage(t: Scalar, t0: Scalar, p: Scalar) -> Scalar:
     """Threshold theta in [0, 1) at the time t: growth from random nuclei (Avrami 1939), 1 - 1/e at the onset t0."""
     return -jnp.expm1(-_power(t / t0, p))

@@ -22,7 +22,7 @@ from ..preset import left_out, model_name
 from ..stack import PREPARED, Stack, at, evaluate, prepared
 from .printer import PREFIX, Printer
 
-SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ())}
+SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ()), "sky": ("float", ())}
 """What a material may read of a place: its type in the shader and in JAX."""
 
 HEADERS = {
@@ -45,7 +45,7 @@ class Shader:
 
     @property
     def asks(self) -> frozenset[str]:
-        """What the BRDF asks for beside a normal and two directions: a tangent, texture coordinates, a distance."""
+        """What the BRDF asks for beside a normal and two directions: a tangent, texture coordinates, a distance, a share of the sky."""
         tangent = any(needs_tangent(layer) for layer in (*self.stack.layers, self.stack.base))
         return frozenset(self.stack.reads) | ({TANGENT} if tangent else set())
 

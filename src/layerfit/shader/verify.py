@@ -90,10 +90,11 @@ def check_pairs(shader: Shader, count: int = 65536, seed: int = 0) -> Parity:
 
 
 def random_places(count: int, seed: int) -> Place:
-    """Texture coordinates over a few tiles, negative ones too, and distances from near to far; float32."""
+    """Texture coordinates over a few tiles, negative ones too, and distances from near to far, all shares of the sky; float32."""
     rng = np.random.default_rng((seed, 1))
     uv, distance = rng.uniform(-2.0, 2.0, (count, 2)), 10.0 ** rng.uniform(-2.0, 2.0, count)
-    return Place(uv.astype(np.float32), distance.astype(np.float32))
+    sky = rng.uniform(0.0, 1.0, count)
+    return Place(*(a.astype(np.float32) for a in (uv, distance, sky)))
 
 
 def random_pairs(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
