@@ -20,6 +20,7 @@ LADDER = [
     {"stack"},
     {"render"},
     {"materials"},
+    {"shipped"},
     {"preset"},
     {"walk"},
 ]

@@ -22,7 +22,7 @@ from layerfit.capture.exr import read_exr
 from layerfit.preset import read_preset
 from layerfit.render import brdf
 
-COMMANDS = ("fit", "render", "eval", "export", "verify", "truth", "metal", "inspect", "demo")
+COMMANDS = ("fit", "render", "eval", "export", "verify", "truth", "presets", "metal", "inspect", "demo")
 
 CONSTANT_LIGHT = """\
 [[light]]
@@ -396,3 +396,22 @@ def test_no_command_is_help():
 def test_names_cost_nothing_to_import(module):
     code = f"import sys, {module}; sys.exit('jax' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, cwd=Path("/")).returncode == 0
+
+
+def test_presets_are_listed():
+    ran = layerfit("presets", "lacquered")
+    assert ran.code == 0
+    lines = ran.out.splitlines()
+    assert "metal" in lines
+    assert "wood" in lines
+    assert re.search(r"^  lacquered_copper +rough copper under an amber lacquer$", ran.out, re.MULTILINE)
+    documents = json.loads(layerfit("presets", "lacquered", "--json").out)
+    assert [document["name"] for document in documents] == [line.split()[0] for line in lines if line.startswith("  ")]
+    assert Path(documents[0]["path"]).is_file()
+    assert layerfit("presets").out.count("\n") > len(lines)
+
+
+def test_a_word_that_no_preset_has_is_said():
+    ran = layerfit("presets", "unobtainium")
+    assert (ran.code, ran.out) == (2, "")
+    assert "no shipped preset has 'unobtainium' in its name or description" in ran.err

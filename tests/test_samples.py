@@ -114,7 +114,7 @@ def test_half_vectors_are_drawn_as_often_as_their_density_says():
     z, phi = np.meshgrid((np.arange(800) + 0.5) / 400 - 1.0, (np.arange(800) + 0.5) / 800 * 2.0 * np.pi)
     s = np.sqrt(1.0 - z * z)
     sphere = np.stack([s * np.cos(phi), s * np.sin(phi), z], -1).reshape(1, -1, 3)
-    total = _half_vector_pdf(sphere, wo).sum() * 4.0 * np.pi / sphere.shape[1]
+    total = _half_vector_pdf(sphere, wo, HALF_VECTOR_WIDTHS).sum() * 4.0 * np.pi / sphere.shape[1]
     widths = np.array(HALF_VECTOR_WIDTHS)[:, None, None]
     tan2, angle = np.meshgrid(np.linspace(0.0, 1.0, 2001)[:-1], (np.arange(64) + 0.5) / 64 * 2.0 * np.pi)
     tan = widths * np.sqrt(tan2 / (1.0 - tan2))

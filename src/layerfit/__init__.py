@@ -2,7 +2,7 @@
 
 - Materials: Stack of Coat or Patina over Conductor, Dielectric, Lambert or OrenNayar, in the form Precise, Corrected or Faithful.
   Weathered metal is a Stack of Deposit, Overgrowth, Erosion and Polish, the latest first.
-  read_preset and write_preset.
+  read_preset and write_preset; shipped_presets lists those that are there, each a Shipped.
 - Classic bases: Phong, Blinn, Lafortune, TorranceSparrow, CookTorrance. Metallic and car paint: Flakes, CarPaint.
   Pigment in layers: KubelkaMunk.
 - fit_lazanyi gives a short Fresnel formula of a metal, a Lazanyi.

@@ -33,6 +33,7 @@ from .shader.verify import (
     check_pairs as check_pairs,
     shade_samples as shade_samples,
 )
+from .shipped import Shipped as Shipped, shipped_presets as shipped_presets
 from .stack import Stack as Stack
 from .surfaces import (
     Blinn as Blinn,

@@ -4,6 +4,7 @@ Data on standard output, tables and progress on standard error. Exit codes: 0 do
 the machine is at fault, with a message that says what to do.
 """
 
+import itertools
 import json
 import sys
 import time
@@ -284,6 +285,34 @@ def truth(
     if as_json:
         _emit(document)
     raise typer.Exit(0 if document["trusted"] else 1)
+
+
+@app.command()
+def presets(
+    word: Annotated[
+        str,
+        typer.Argument(help="Part of a name, group, structure or description: copper, wood, flakes. Left out: all of them."),
+    ] = "",
+    as_json: Json = False,
+) -> None:
+    """List the presets that ship: found by name wherever a preset is asked for.
+
+    Example: `layerfit presets copper`
+    """
+    from .errors import InputError
+    from .shipped import shipped_presets
+
+    found = shipped_presets(word)
+    if not found:
+        raise InputError(f"no shipped preset has {word!r} in its name or description; `layerfit presets` lists all of them")
+    if as_json:
+        _emit([{**vars(preset), "path": str(preset.path)} for preset in found])
+        return
+    width = max(len(preset.name) for preset in found)
+    for group, members in itertools.groupby(found, lambda preset: preset.group):
+        typer.echo(group)
+        for preset in members:
+            typer.echo(f"  {preset.name:<{width}}  {preset.description}")
 
 
 @app.command()

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ._data import shaders
 from ._fields import Param, given, params
 from .documents import check_keys, nearest, read_document, write_text
 from .errors import InputError
@@ -23,6 +22,7 @@ from .forms.faithful import Faithful
 from .forms.precise import Precise
 from .layers import LAYERS
 from .optics.metals import metal
+from .shipped import WORDS, find_preset
 from .stack import FORMS, IN_TIME, Stack
 from .surfaces import BASES, Conductor
 
@@ -31,7 +31,7 @@ VERSION = 1
 MODELS: dict[str, type] = {"precise": Precise, "corrected": Corrected, "faithful": Faithful}
 FORM_KEYS = ("model", "interface", "options")
 _STACK_KEYS = (*FORM_KEYS, "layers", "base")
-_PRESET_KEYS = ("schema", "version", "name", *_STACK_KEYS, "left_out", "fit")
+_PRESET_KEYS = ("schema", "version", "name", *WORDS, *_STACK_KEYS, "left_out", "fit")
 
 
 def read_preset(path: Path | str) -> Stack:
@@ -39,7 +39,7 @@ def read_preset(path: Path | str) -> Stack:
 
     Raises `InputError` that says which key is wrong and what was meant.
     """
-    path = _shipped(Path(path))
+    path = find_preset(Path(path))
     document = read_document(path)
     where = str(path)
     if document.get("schema") != SCHEMA:
@@ -50,26 +50,16 @@ def read_preset(path: Path | str) -> Stack:
             "A newer layerfit reads newer presets."
         )
     check_keys(document, _PRESET_KEYS, where)
+    for key in ("name", *WORDS):
+        if not isinstance(document.get(key, ""), str):
+            raise InputError(f"{where}: {key} = {document[key]!r}: should be text")
     return stack_of({key: document[key] for key in _STACK_KEYS if key in document}, where)
 
 
-def _shipped(path: Path) -> Path:
-    """Where a preset is: a name without an ending that is no file here may be that of a shipped one."""
-    if path.suffix or path.exists():
-        return path
-    folder = shaders() / "presets"
-    names = sorted(file.stem for file in folder.glob("*.json"))
-    if path.name not in names:
-        raise InputError(
-            f"{path}: there is no such file, and no shipped preset of that name{nearest(path.name, names)}. "
-            f"Shipped are {', '.join(names)}."
-        )
-    return folder / f"{path.name}.json"
-
-
 def preset_of(stack: Stack, name: str, **more: Any) -> dict[str, Any]:
-    """The preset document of a material."""
-    document: dict[str, Any] = {"schema": SCHEMA, "version": VERSION, "name": name, "model": model_name(stack)}
+    """The preset document of a material; `more` are further keys: words for people, and `fit`."""
+    words = {key: more.pop(key) for key in WORDS if key in more}
+    document: dict[str, Any] = {"schema": SCHEMA, "version": VERSION, "name": name, **words, "model": model_name(stack)}
     changed = {
         field.name: getattr(stack.form, field.name)
         for field in dataclasses.fields(stack.form)
@@ -86,7 +76,7 @@ def preset_of(stack: Stack, name: str, **more: Any) -> dict[str, Any]:
 
 
 def write_preset(path: Path | str, stack: Stack, name: str, **more: Any) -> None:
-    """Write a preset file, whole or not at all; `more` are further keys, such as `fit`."""
+    """Write a preset file, whole or not at all; `more` are further keys, such as `description`."""
     write_text(Path(path), json.dumps(preset_of(stack, name, **more), indent=2) + "\n")
 
 

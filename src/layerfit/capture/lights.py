@@ -41,19 +41,28 @@ def is_exact(light: Light) -> "TypeIs[Directional | Point]":
 
 
 def receive(
-    lights: tuple[Light, ...], position: np.ndarray, normal: np.ndarray, view: np.ndarray, samples: int, seed: int
+    lights: tuple[Light, ...],
+    position: np.ndarray,
+    normal: np.ndarray,
+    view: np.ndarray,
+    samples: int,
+    seed: int,
+    widths: tuple[float, ...] = HALF_VECTOR_WIDTHS,
 ) -> Received:
-    """Light at points (n, 3): one sample for each exact light, and `samples` for each of the others."""
+    """Light at points (n, 3): one sample for each exact light, and `samples` for each of the others.
+
+    `widths` are of the half vectors: those of the lobes that are looked at.
+    """
     rng = np.random.default_rng(seed)
     size = max(1, CACHED // samples)
     blocks = [slice(start, start + size) for start in range(0, max(len(position), 1), size)]
-    rows = [_receive(lights, position[b], normal[b], view[b], samples, rng) for b in blocks]
+    rows = [_receive(lights, position[b], normal[b], view[b], samples, rng, widths) for b in blocks]
     return Received(np.concatenate([r.to_light for r in rows]), np.concatenate([r.weight for r in rows]))
 
 
-def _receive(lights, position, normal, view, samples, rng) -> Received:
+def _receive(lights, position, normal, view, samples, rng, widths) -> Received:
     parts = [
-        _exact(light, position, normal) if is_exact(light) else _quadrature(light, position, normal, view, samples, rng)
+        _exact(light, position, normal) if is_exact(light) else _quadrature(light, position, normal, view, samples, rng, widths)
         for light in lights
     ]
     return Received(np.concatenate([p.to_light for p in parts], 1), np.concatenate([p.weight for p in parts], 1))
@@ -79,14 +88,15 @@ def _quadrature(
     view: np.ndarray,
     samples: int,
     rng: np.random.Generator,
+    widths: tuple[float, ...],
 ) -> Received:
     n = len(position)
-    strategies = 1 + len(HALF_VECTOR_WIDTHS) + (not isinstance(light, Constant))
+    strategies = 1 + len(widths) + (not isinstance(light, Constant))
     each = max(1, samples // strategies)
     to_surface = frames(normal, None)
     wo = np.einsum("nij,nj->ni", to_surface, view)
     drawn = [_cosine_lobe(_points(n, each, rng))]
-    for alpha in HALF_VECTOR_WIDTHS:
+    for alpha in widths:
         h = _ggx_normals(_points(n, each, rng), alpha)
         drawn.append(2.0 * np.sum(h * wo[:, None], -1, keepdims=True) * h - wo[:, None])
     directions = [w @ to_surface for w in drawn]
@@ -99,7 +109,7 @@ def _quadrature(
         directions.append(own.draw(_points(n, each, rng)))
     to_light = np.concatenate(directions, 1)
     wi = to_light @ to_surface.swapaxes(1, 2)
-    mixture = _cosine_pdf(wi) + _half_vector_pdf(wi, wo)
+    mixture = _cosine_pdf(wi) + _half_vector_pdf(wi, wo, widths)
     if own:
         mixture = mixture + own.pdf(to_light)
     cosine = wi[..., 2]
@@ -132,7 +142,7 @@ def _ggx_normals(u: np.ndarray, alpha: float) -> np.ndarray:
     return np.stack([r * np.cos(phi), r * np.sin(phi), z], -1)
 
 
-def _half_vector_pdf(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+def _half_vector_pdf(wi: np.ndarray, wo: np.ndarray, widths: tuple[float, ...]) -> np.ndarray:
     """Density of directions reflected at such normals, summed over the widths."""
     h = wi + wo[:, None]
     h2, side2 = np.einsum("nsi,nsi->ns", h, h), h[..., 0] ** 2 + h[..., 1] ** 2
@@ -140,7 +150,7 @@ def _half_vector_pdf(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
     c, z = (h @ wo[..., None])[..., 0] / length, h[..., 2] / length
     tan2 = side2 / np.maximum(h[..., 2], 1e-30) ** 2
     # D z / (4 c), with D = 1 / (pi alpha^2 z^4 (1 + tan^2 / alpha^2)^2)
-    lobes = sum(1.0 / (alpha * (1.0 + tan2 / alpha**2)) ** 2 for alpha in HALF_VECTOR_WIDTHS)
+    lobes = sum(1.0 / (alpha * (1.0 + tan2 / alpha**2)) ** 2 for alpha in widths)
     there = (c > 0.0) & (z > 0.0)
     return np.where(there, lobes / (4.0 * np.pi * np.maximum(c, 1e-9) * np.where(there, z, 1.0) ** 3), 0.0)
 

@@ -1,0 +1,164 @@
+#version 330 core
+// anodised_titanium_magenta: Conductor.
+// Printed by layerfit 0.1.0 from its corrected form.
+// Left out, because this material does without: coat, titanium: anisotropy.
+// titanium: under a film of 146 nm, whose colour in daylight is in its constants.
+//
+// vec3 lf_brdf(vec3 n, vec3 v, vec3 l) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
+// the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
+// Define LF_LIBRARY to take the functions without the entry point below.
+
+struct Conductor {
+    vec3 film_0;  // f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
+    vec3 film_1;  // degree 1
+    vec3 film_2;  // degree 2
+    vec3 film_3;  // degree 3
+    vec3 film_4;  // degree 4
+    vec3 film_5;  // degree 5
+    vec3 film_6;  // degree 6
+    vec3 film_7;  // degree 7
+    vec3 film_8;  // degree 8
+    vec3 film_9;  // degree 9
+    float alpha;  // width of the facet slopes; the square of an artist's roughness
+};
+
+const Conductor lf_titanium = Conductor(
+    vec3(0.18836424, 0.36108226, 0.28659987),            // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
+    vec3(0.7181573, -0.1634812, 0.11674406),             // film_1: degree 1
+    vec3(-0.23611163, -0.06609018, 0.046374194),         // film_2: degree 2
+    vec3(-0.017807856, -0.012958847, 0.016835261),       // film_3: degree 3
+    vec3(0.035093926, 0.005752556, 0.004198514),         // film_4: degree 4
+    vec3(-0.017297097, 0.0043090843, -0.0015684422),     // film_5: degree 5
+    vec3(0.0009896457, 0.00011154264, -0.0013974961),    // film_6: degree 6
+    vec3(0.0013606884, -0.00022827461, -0.00029172748),  // film_7: degree 7
+    vec3(-0.00075495243, 8.944422e-06, 3.6086887e-05),   // film_8: degree 8
+    vec3(0.00016274303, -2.1524727e-05, 6.1091036e-05),  // film_9: degree 9
+    0.25                                                 // alpha: width of the facet slopes; the square of an artist's roughness
+);
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+}
+
+// sqrt(c) as -1 to 1, from where a film's polynomial begins.
+float lf_chebyshev_argument(float c) {
+    return max((2.0 * sqrt(max(c, 0.0)) - 1.06) / 0.94, -1.0);
+}
+
+// What Schlick's formula takes for f0 of a metal with a film, in daylight.
+vec3 lf_film_on_metal(Conductor base, float c) {
+    float s = lf_chebyshev_argument(c);
+    vec3 total = base.film_8 + 2.0 * s * base.film_9;
+    vec3 total2 = base.film_7 + 2.0 * s * total - base.film_9;
+    total = base.film_6 + 2.0 * s * total2 - total;
+    total2 = base.film_5 + 2.0 * s * total - total2;
+    total = base.film_4 + 2.0 * s * total2 - total;
+    total2 = base.film_3 + 2.0 * s * total - total2;
+    total = base.film_2 + 2.0 * s * total2 - total;
+    total2 = base.film_1 + 2.0 * s * total - total2;
+    return base.film_0 + s * total2 - total;
+}
+
+// Schlick 1994, eq. 15, from the reflectance at normal incidence.
+vec3 lf_fresnel_schlick(float c, vec3 f0) {
+    float m = 1.0 - c;
+    float m2 = m * m;
+    return f0 + (1.0 - f0) * (m2 * m2 * m);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec3 lf_half_vector(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return s / sqrt(max(dot(s, s), 1e-20));
+}
+
+// GGX density of facet normals (Walter et al. 2007, eq. 33).
+float lf_ggx_d(vec3 h, float alpha) {
+    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
+    float root = 1.0 / (e * alpha);
+    return root * root / 3.1415927;
+}
+
+// NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
+float lf_ggx_projection(vec3 w, float alpha) {
+    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
+// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
+vec3 lf_evaluate(vec3 wi, vec3 wo) {
+    bool lit = wi.z > 0.0 && wo.z > 0.0;
+    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
+    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    float t = lf_half_cosine(wi, wo);
+    vec3 reflected = lf_fresnel_schlick(t, lf_film_on_metal(lf_titanium, t));
+    vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
+    vec3 F = min(max(reflected, 0.0), 1.0) + 0.0025 * (below * below);
+    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_titanium.alpha);
+    float projection_i = lf_ggx_projection(wi, lf_titanium.alpha);
+    float projection_o = lf_ggx_projection(wo, lf_titanium.alpha);
+    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    return lit ? F * D * V : vec3(0.0);
+}
+
+// BRDF [1/sr] in any frame.
+vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
+    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
+    return lf_evaluate(surface * l, surface * v);
+}
+
+#ifndef LF_LIBRARY
+
+#ifndef LF_LIGHTS
+#define LF_LIGHTS 1
+#endif
+
+in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
+in vec3 v_normal;
+out vec4 color;
+
+uniform vec3 u_eye;
+uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
+uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
+
+// Unit direction l to a light and the irradiance on a surface that faces it.
+vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
+    vec3 away = light.xyz - position * light.w;
+    float distance2 = dot(away, away);
+    l = away * inversesqrt(distance2);
+    return rgb / (light.w > 0.0 ? distance2 : 1.0);
+}
+
+// Linear radiance, or sRGB (IEC 61966-2-1) for a screen when LF_SRGB is defined.
+vec3 lf_output(vec3 radiance) {
+#ifdef LF_SRGB
+    vec3 x = clamp(radiance, 0.0, 1.0);
+    return mix(12.92 * x, 1.055 * pow(max(x, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
+#else
+    return radiance;
+#endif
+}
+
+void main() {
+    vec3 n = normalize(v_normal);
+    vec3 v = normalize(u_eye - v_position);
+    vec3 radiance = vec3(0.0);
+    for (int k = 0; k < LF_LIGHTS; ++k) {
+        vec3 l;
+        vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
+        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+    }
+    color = vec4(lf_output(radiance), 1.0);
+}
+
+#endif

@@ -1,0 +1,126 @@
+#version 330 core
+// bare_concrete: OrenNayar.
+// Printed by layerfit 0.1.0 from its corrected form.
+// Left out, because this material does without: coat.
+//
+// vec3 lf_brdf(vec3 n, vec3 v, vec3 l) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
+// the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
+// Define LF_LIBRARY to take the functions without the entry point below.
+
+struct OrenNayar {
+    vec3 albedo;  // part of the light that is sent back
+    float sigma;  // standard deviation of the facet angle [rad]
+};
+
+const OrenNayar lf_concrete = OrenNayar(
+    vec3(0.42, 0.4, 0.37),  // albedo: part of the light that is sent back
+    0.5                     // sigma: standard deviation of the facet angle [rad]
+);
+
+// Angle of the point (x, y) by a polynomial (relative error 2e-8): some drivers' atan is off by 2e-4.
+float lf_atan2(float y, float x) {
+    float ax = abs(x);
+    float ay = abs(y);
+    float t = min(ax, ay) / max(max(ax, ay), 1e-30);
+    float u = t * t;
+    float p = 0.10622653 + u * (-0.07465779 + u * (0.042241037 + u * (-0.015793836 + u * 0.0027817077)));
+    float a = t * (1.0 + u * (-0.33333045 + u * (0.19992018 + u * (-0.1419892 + u * p))));
+    a = ay > ax ? 1.5707964 - a : a;
+    a = x < 0.0 ? 3.1415927 - a : a;
+    return y < 0.0 ? -a : a;
+}
+
+// Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection.
+vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
+    float sigma2 = sigma * sigma;
+    float c1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33);
+    float c2 = 0.45 * sigma2 / (sigma2 + 0.09);
+    float c3 = 0.125 * sigma2 / (sigma2 + 0.09);
+    float c4 = 0.17 * sigma2 / (sigma2 + 0.13);
+    float sin_i = sqrt(max(wi.x * wi.x + wi.y * wi.y, 0.0));
+    float sin_o = sqrt(max(wo.x * wo.x + wo.y * wo.y, 0.0));
+    float elevation_i = lf_atan2(wi.z, sin_i) * 0.63661975;
+    float elevation_o = lf_atan2(wo.z, sin_o) * 0.63661975;
+    float higher = max(elevation_i, elevation_o);
+    float lower_cos = min(wi.z, wo.z);
+    float larger_cos = max(wi.z, wo.z);
+    float larger_sin = max(sin_i, sin_o);
+    float dot_xy = wi.x * wo.x + wi.y * wo.y;
+    float cos_phi = dot_xy / max(sin_i * sin_o, 1e-14);
+    float sin_phi = (wi.x * wo.y - wi.y * wo.x) / max(sin_i * sin_o, 1e-14);
+    float aside = sin_phi * sin_phi / (1.0 + abs(cos_phi));
+    float forward = dot_xy / larger_cos;
+    float gap = higher * (3.0 - higher * (3.0 - higher)) - lower_cos * lower_cos / (1.0 + larger_sin);
+    float backward = dot_xy * gap / max(larger_cos * larger_sin, 1e-14);
+    float tan_mean = (sin_i + sin_o) / (wi.z + wo.z);
+    float smaller = 1.0 - higher;
+    float product = smaller * (1.0 - min(elevation_i, elevation_o));
+    float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
+    direct = direct + aside * c3 * (product * product) * tan_mean;
+    float interreflected = c4 * (1.0 - cos_phi * (smaller * smaller));
+    return albedo / 3.1415927 * (direct + albedo * interreflected);
+}
+
+// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
+vec3 lf_evaluate(vec3 wi, vec3 wo) {
+    bool lit = wi.z > 0.0 && wo.z > 0.0;
+    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
+    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    return lit ? lf_oren_nayar_full(wi, wo, lf_concrete.albedo, lf_concrete.sigma) : vec3(0.0);
+}
+
+// BRDF [1/sr] in any frame.
+vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
+    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
+    return lf_evaluate(surface * l, surface * v);
+}
+
+#ifndef LF_LIBRARY
+
+#ifndef LF_LIGHTS
+#define LF_LIGHTS 1
+#endif
+
+in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
+in vec3 v_normal;
+out vec4 color;
+
+uniform vec3 u_eye;
+uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
+uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
+
+// Unit direction l to a light and the irradiance on a surface that faces it.
+vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
+    vec3 away = light.xyz - position * light.w;
+    float distance2 = dot(away, away);
+    l = away * inversesqrt(distance2);
+    return rgb / (light.w > 0.0 ? distance2 : 1.0);
+}
+
+// Linear radiance, or sRGB (IEC 61966-2-1) for a screen when LF_SRGB is defined.
+vec3 lf_output(vec3 radiance) {
+#ifdef LF_SRGB
+    vec3 x = clamp(radiance, 0.0, 1.0);
+    return mix(12.92 * x, 1.055 * pow(max(x, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
+#else
+    return radiance;
+#endif
+}
+
+void main() {
+    vec3 n = normalize(v_normal);
+    vec3 v = normalize(u_eye - v_position);
+    vec3 radiance = vec3(0.0);
+    for (int k = 0; k < LF_LIGHTS; ++k) {
+        vec3 l;
+        vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
+        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+    }
+    color = vec4(lf_output(radiance), 1.0);
+}
+
+#endif

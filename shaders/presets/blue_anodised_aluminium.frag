@@ -1,0 +1,415 @@
+#version 330 core
+// blue_anodised_aluminium: Coat over Conductor.
+// Printed by layerfit 0.1.0 from its precise form.
+// Left out, because this material does without: oxide: anisotropy, aluminium: anisotropy.
+// Indices of refraction are relative to the layer above: its own index divides those in the preset.
+//
+// vec3 lf_brdf(vec3 n, vec3 v, vec3 l) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
+// the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
+// Define LF_LIBRARY to take the functions without the entry point below.
+
+struct Coat {
+    float alpha;  // width of the facet slopes; the square of an artist's roughness
+    float eta;    // index of refraction, against air
+    vec3 tau;     // optical depth, one way at normal incidence
+};
+
+struct Interface {
+    float tilt;        // turn of the mean facet towards a grazing direction
+    float gain;        // part of the reflected light that a second facet lets in
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec4 passed_high;  // the other four, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface
+    vec4 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it
+    vec4 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec4 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec4 theta_high;   // 
+};
+
+struct Conductor {
+    float alpha;  // width of the facet slopes; the square of an artist's roughness
+    vec3 eta;     // index of refraction, real part
+    vec3 k;       // index of refraction, imaginary part
+};
+
+struct Curve {
+    vec3 c0;  // coefficients of the powers of the curves' argument
+    vec3 c1;  // 
+    vec3 c2;  // 
+    vec3 c3;  // 
+    vec3 c4;  // 
+    vec3 c5;  // 
+    vec3 c6;  // 
+    vec3 c7;  // 
+};
+
+struct Crossing {
+    vec3 w;       // median direction
+    float T;      // energy that passes
+    float a;      // spread, as a width
+    float path;   // mean path, in thicknesses
+    float theta;  // scale of the path's distribution
+    float s;      // argument of the baked curves
+};
+
+const Coat lf_oxide = Coat(
+    0.18,                         // alpha: width of the facet slopes; the square of an artist's roughness
+    1.65,                         // eta: index of refraction, against air
+    vec3(1.6500001, 0.72, 0.09)   // tau: optical depth, one way at normal incidence
+);
+
+const Interface lf_oxide_interface = Interface(
+    0.046419468,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.10031511,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.03934908, 0.026510041, 0.032650657, -0.022436418),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.0328139, 0.028090157, 0.009836316, -0.011298083),   // passed_high: the other four, of higher powers
+    vec4(1.0975682, -0.15713176, 0.12942672, -0.04542494),      // bend: sine of the refracted light over that at a smooth interface
+    vec4(-0.057476044, 0.07574177, 0.00493145, -0.026345253),   // bend_high: 
+    vec4(0.66335785, -0.2969888, 0.117569864, -0.015427589),    // spread: width of a lobe seen through it
+    vec4(-0.1550864, 0.123889685, 0.053566456, -0.060359955),   // spread_high: 
+    vec4(1.0968367, -0.1920546, 0.17082345, -0.050065517),      // path: mean path over that of the refracted direction
+    vec4(-0.11193919, 0.12059212, 0.024900675, -0.049715042),   // path_high: 
+    vec4(0.23706682, -0.47861528, 0.46576566, -0.08105123),     // theta: scale of the path's distribution
+    vec4(-0.3500735, 0.15206563, 0.12560435, -0.006695181)      // theta_high: 
+);
+
+const Conductor lf_aluminium = Conductor(
+    0.28,                                    // alpha: width of the facet slopes; the square of an artist's roughness
+    vec3(0.9115151, 0.59818184, 0.3678788),  // eta: index of refraction, real part
+    vec3(4.641212, 3.9733336, 3.2454545)     // k: index of refraction, imaginary part
+);
+
+const Curve lf_oxide_again = Curve(
+    vec3(0.0030880119, 0.033689816, 0.20722334),        // c0: coefficients of the powers of the curves' argument
+    vec3(0.00033428543, 0.001051194, -0.01276559),      // c1: 
+    vec3(-4.8076967e-05, -0.0013245754, -0.00893499),   // c2: 
+    vec3(0.00026468094, 0.0013033822, 7.110834e-05),    // c3: 
+    vec3(-0.00032590702, -0.004242532, -0.028619945),   // c4: 
+    vec3(-0.00042954087, -0.0029874444, -0.009333849),  // c5: 
+    vec3(0.00020619016, 0.0022733435, 0.013567805),     // c6: 
+    vec3(0.00017652102, 0.001033932, 0.003203392)       // c7: 
+);
+
+const Curve lf_oxide_rest = Curve(
+    vec3(0.15604745, 0.3281166, 0.6784849),             // c0: coefficients of the powers of the curves' argument
+    vec3(0.0012289584, -0.009724386, -0.042870805),     // c1: 
+    vec3(-0.004686177, -0.018907994, -0.033713818),     // c2: 
+    vec3(-0.008841932, -0.014172494, -0.025995731),     // c3: 
+    vec3(-0.008658469, -0.008200884, -0.017255783),     // c4: 
+    vec3(-0.00036883354, -0.001180172, -0.0058374405),  // c5: 
+    vec3(0.00015226007, 0.00038838387, 0.00034618378),  // c6: 
+    vec3(-0.00084489584, 0.00066280365, 0.0036976337)   // c7: 
+);
+
+// log(1 + x) without the cancellation near 0.
+float lf_log1p(float x) {
+    if (abs(x) > 0.3) {
+        return log(1.0 + x);
+    }
+    float s = x / (2.0 + x);
+    float u = s * s;
+    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+}
+
+vec3 lf_log1p(vec3 x) {
+    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
+}
+
+// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+float lf_grazing(float NoW) {
+    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+}
+
+// Cosine between a direction and the facets that it meets.
+float lf_facet_cosine(vec3 w, float tilt) {
+    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
+float lf_transmittance_dielectric(float c, float eta) {
+    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float eta2 = eta * eta;
+    float perpendicular = c + g;
+    float parallel = eta2 * c + g;
+    float product = 2.0 * c * g;
+    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
+    return eta == 1.0 ? 1.0 : passed;
+}
+
+// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
+float lf_with_second_facet(float T, float gain) {
+    return T + (1.0 - T) * gain;
+}
+
+// A polynomial of eight coefficients at s.
+float lf_curve(vec4 low, vec4 high, float s) {
+    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+}
+
+// Follow one direction through the coat's rough top.
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w) {
+    float s = lf_grazing(w.z);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
+    T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
+    T = min(T, 1.0);
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
+    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    bend = min(bend, 0.9998 / max(sine, 1e-06));
+    sine = sine * bend;
+    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
+    float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+}
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+}
+
+// Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
+float lf_fresnel_dielectric(float c, float eta) {
+    float delta = (eta - 1.0) * (eta + 1.0);
+    float g2 = delta + c * c;
+    bool refracts = g2 > 1e-08;
+    float g = sqrt(refracts ? g2 : 1.0);
+    float eta2 = eta * eta;
+    float perpendicular = (c + g) * (c + g);
+    float parallel = (eta2 * c + g) * (eta2 * c + g);
+    float rs = -delta / perpendicular;
+    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float reflectance = 0.5 * (rs * rs + rp * rp);
+    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec3 lf_half_vector(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return s / sqrt(max(dot(s, s), 1e-20));
+}
+
+// GGX density of facet normals (Walter et al. 2007, eq. 33).
+float lf_ggx_d(vec3 h, float alpha) {
+    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
+    float root = 1.0 / (e * alpha);
+    return root * root / 3.1415927;
+}
+
+// NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
+float lf_ggx_projection(vec3 w, float alpha) {
+    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
+// Part of a lobe's width, as a power, that is due to the base.
+float lf_base_share(Crossing i, Crossing o, float alpha) {
+    float base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), 1.412);
+    return base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
+}
+
+// The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
+vec3 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
+    float own = pow(max(x.a, 1e-30), 1.412);
+    float total = pow(max(alpha * (i.w.z + o.w.z), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
+    float turn = 0.7504 * own / total;
+    float y0 = x.w.x - turn * (i.w.x + o.w.x);
+    float y1 = x.w.y - turn * (i.w.y + o.w.y);
+    float sine = sqrt(max(y0 * y0 + y1 * y1, 0.0));
+    float held = min(1.0, 0.9998 / max(sine, 1e-06));
+    sine = min(sine, 0.9998);
+    return vec3(y0 * held, y1 * held, sqrt(max((1.0 - sine) * (1.0 + sine), 0.0)));
+}
+
+// Part of the path's spread that counts, by the base's share of the width.
+float lf_direct(float share, float d, float c, float e) {
+    return min(max(d + c * pow(max(share, 1e-30), e), 0.0), 1.5);
+}
+
+// Mean path of light that the base sends on: between that of one direction and that of all that cross.
+float lf_between(vec3 y, Crossing x, float part) {
+    float straight = 1.0 / y.z;
+    return straight + part * (x.path - straight);
+}
+
+// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
+vec3 lf_absorbed(float path, float theta, vec3 tau) {
+    float scale = max(theta, 1e-06);
+    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
+}
+
+// Mean of u among the paths that are left: sum of u exp(-tau u) over that of exp(-tau u).
+vec3 lf_projected(float path, float theta, vec3 tau) {
+    return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
+}
+
+// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
+vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
+    float c2 = c * c;
+    float s2 = (1.0 - c) * (1.0 + c);
+    vec3 p = (eta - k) * (eta + k) - s2;
+    vec3 nk = eta * k;
+    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
+    vec3 larger = sqrt(0.5 * (q + abs(p)));
+    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 twice_ac = 2.0 * a * c;
+    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
+    float s4 = s2 * s2;
+    vec3 even = q * c2 + s4;
+    vec3 odd = twice_ac * s2;
+    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
+    return 0.5 * (rs + rp);
+}
+
+// 0 where the indices match and there is no interface, 1 from the first index of the tables on.
+float lf_presence(float eta) {
+    float t = max((eta - 1.0) / 0.15, 0.0);
+    t = min(t, 1.0);
+    return t * (2.0 - t);
+}
+
+// Lambda of the GGX distribution (Heitz 2014, eq. 72).
+float lf_smith_lambda(vec3 w, float alpha) {
+    float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
+    float x = alpha * alpha * tan2;
+    return 0.5 * x / (1.0 + sqrt(1.0 + x));
+}
+
+// D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
+float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, float alpha, float masked) {
+    float M = yi.z + yo.z;
+    float M2 = M * M;
+    float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
+    float width2 = pow(max(pow(max(alpha * M, 1e-30), 1.412) + spread, 1e-30), 1.4164306);
+    float own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
+    float r = max(1.0 + 0.3271 * (width2 / own2 - 1.0), 0.6);
+    r = min(r, 4.0);
+    float log_r = log(r);
+    float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
+    float X0 = i.w.x + o.w.x;
+    float X1 = i.w.y + o.w.y;
+    float v = (X0 * X0 + X1 * X1) / width2;
+    float Y0 = yi.x + yo.x;
+    float Y1 = yi.y + yo.y;
+    float tilt = 1.0 + (Y0 * Y0 + Y1 * Y1) / M2;
+    float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
+    return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * width2 * (1.0 + v * (b + r * v)));
+}
+
+// The polynomial at s; an energy is never below 0.
+vec3 lf_amount(Curve curve, float s) {
+    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
+    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+float lf_wider(float alpha, float coat_alpha) {
+    return pow(max(2.0 * pow(max(alpha, 1e-30), 1.412) + 0.5751 * pow(max(coat_alpha, 1e-30), 1.412), 1e-30), 0.7082153);
+}
+
+// What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
+float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
+    float back = eta * eta * (i.w.x * o.w.x + i.w.y * o.w.y);
+    return max(1.0 - (1.0 - min(alpha, 1.0)) * back, 0.0) / 3.1415927;
+}
+
+// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
+vec3 lf_evaluate(vec3 wi, vec3 wo) {
+    bool lit = wi.z > 0.0 && wo.z > 0.0;
+    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
+    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    Crossing crossing = lf_pass_interface(lf_oxide_interface, lf_oxide.eta, lf_oxide.alpha, wi);
+    Crossing crossing2 = lf_pass_interface(lf_oxide_interface, lf_oxide.eta, lf_oxide.alpha, wo);
+    float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_oxide.eta);
+    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_oxide.alpha);
+    float projection_i = lf_ggx_projection(wi, lf_oxide.alpha);
+    float projection_o = lf_ggx_projection(wo, lf_oxide.alpha);
+    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float throughput = crossing.T * crossing2.T / (lf_oxide.eta * lf_oxide.eta);
+    float share = lf_base_share(crossing, crossing2, lf_aluminium.alpha);
+    vec3 yi = lf_lean(crossing, crossing, crossing2, lf_aluminium.alpha);
+    vec3 yo = lf_lean(crossing2, crossing, crossing2, lf_aluminium.alpha);
+    float part = lf_direct(share, 0.3296, 0.3522, 1.803);
+    vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_oxide.tau);
+    part = lf_direct(share, 0.3096, 0.2662, 1.772);
+    float path = lf_between(yi, crossing, part);
+    vec3 U = lf_projected(path, part * crossing.theta, lf_oxide.tau);
+    part = lf_direct(share, 0.3296, 0.3522, 1.803);
+    A = A * lf_absorbed(lf_between(yo, crossing2, part), part * crossing2.theta, lf_oxide.tau);
+    part = lf_direct(share, 0.3096, 0.2662, 1.772);
+    path = lf_between(yo, crossing2, part);
+    U = U * lf_projected(path, part * crossing2.theta, lf_oxide.tau);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(yi, yo), lf_aluminium.eta, lf_aluminium.k);
+    float rise = 1.0 + 0.3036 * lf_presence(lf_oxide.eta) * lf_oxide.alpha * lf_oxide.alpha * share;
+    float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, lf_aluminium.alpha, lf_aluminium.alpha);
+    vec3 again = 0.5 * F2 * (lf_amount(lf_oxide_again, crossing.s) + lf_amount(lf_oxide_again, crossing2.s));
+    vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(lf_aluminium.alpha, lf_oxide.alpha), lf_aluminium.alpha);
+    vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, lf_aluminium.alpha);
+    return lit ? F * D * V + throughput * A * (F2 * U * lobes2 + rest) : vec3(0.0);
+}
+
+// BRDF [1/sr] in any frame.
+vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
+    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
+    return lf_evaluate(surface * l, surface * v);
+}
+
+#ifndef LF_LIBRARY
+
+#ifndef LF_LIGHTS
+#define LF_LIGHTS 1
+#endif
+
+in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
+in vec3 v_normal;
+out vec4 color;
+
+uniform vec3 u_eye;
+uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
+uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
+
+// Unit direction l to a light and the irradiance on a surface that faces it.
+vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
+    vec3 away = light.xyz - position * light.w;
+    float distance2 = dot(away, away);
+    l = away * inversesqrt(distance2);
+    return rgb / (light.w > 0.0 ? distance2 : 1.0);
+}
+
+// Linear radiance, or sRGB (IEC 61966-2-1) for a screen when LF_SRGB is defined.
+vec3 lf_output(vec3 radiance) {
+#ifdef LF_SRGB
+    vec3 x = clamp(radiance, 0.0, 1.0);
+    return mix(12.92 * x, 1.055 * pow(max(x, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
+#else
+    return radiance;
+#endif
+}
+
+void main() {
+    vec3 n = normalize(v_normal);
+    vec3 v = normalize(u_eye - v_position);
+    vec3 radiance = vec3(0.0);
+    for (int k = 0; k < LF_LIGHTS; ++k) {
+        vec3 l;
+        vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
+        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+    }
+    color = vec4(lf_output(radiance), 1.0);
+}
+
+#endif

@@ -1,0 +1,265 @@
+#version 330 core
+// pearl_nail_varnish: Coat over Lambert.
+// Printed by layerfit 0.1.0 from its corrected form.
+// Left out, because this material does without: lacquer: anisotropy.
+// lacquer: under a film of 150 nm, whose colour in daylight is in its constants.
+//
+// vec3 lf_brdf(vec3 n, vec3 v, vec3 l) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
+// the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
+// Define LF_LIBRARY to take the functions without the entry point below.
+
+struct Coat {
+    vec3 film_0;  // f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
+    vec3 film_1;  // degree 1
+    vec3 film_2;  // degree 2
+    vec3 film_3;  // degree 3
+    vec3 film_4;  // degree 4
+    vec3 film_5;  // degree 5
+    vec3 film_6;  // degree 6
+    vec3 film_7;  // degree 7
+    vec3 film_8;  // degree 8
+    vec3 film_9;  // degree 9
+    float alpha;  // width of the facet slopes; the square of an artist's roughness
+    float eta;    // index of refraction, against air
+    vec3 tau;     // optical depth, one way at normal incidence
+};
+
+struct Interface {
+    float n;            // index of the medium below, against air
+    float alpha;        // width of the facets, mean of the axes
+    float tilt;         // turn of the mean facet towards a grazing direction
+    float gain;         // part of the reflected light that a second facet lets in
+    float lengthening;  // path added by the spread of refracted directions, in thicknesses
+    float drift;        // scale of the path added at grazing angles
+};
+
+struct Lambert {
+    vec3 albedo;  // part of the light that is sent back
+};
+
+struct Crossing {
+    vec3 w;             // direction in the medium below
+    vec3 T;             // energy that passes
+    float spread;       // width of the refracted directions over that of the facets
+    float lengthening;  // path beyond that of the refracted direction, in thicknesses
+    float drift;        // the part of it due to grazing incidence
+};
+
+const Coat lf_lacquer = Coat(
+    vec3(-0.008458251, -0.0023538321, 0.09314569),        // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
+    vec3(0.07892506, 0.122860804, 0.18226524),            // film_1: degree 1
+    vec3(-0.06310524, -0.03589858, -0.049200736),         // film_2: degree 2
+    vec3(-0.0031896513, 0.00073967874, -0.0012692176),    // film_3: degree 3
+    vec3(0.014124807, 0.013281755, 0.013495583),          // film_4: degree 4
+    vec3(-0.00045796484, -0.00016291253, -0.0025657546),  // film_5: degree 5
+    vec3(-0.00077046454, -0.0008373279, -0.0009544287),   // film_6: degree 6
+    vec3(-3.441889e-05, -0.00014110655, -2.5812536e-05),  // film_7: degree 7
+    vec3(-5.9759244e-05, -7.969234e-05, -0.00010415539),  // film_8: degree 8
+    vec3(3.3383258e-05, 2.6030466e-05, 5.0006434e-05),    // film_9: degree 9
+    0.12,                                                 // alpha: width of the facet slopes; the square of an artist's roughness
+    1.5,                                                  // eta: index of refraction, against air
+    vec3(0.05, 0.5, 0.25)                                 // tau: optical depth, one way at normal incidence
+);
+
+const Interface lf_lacquer_interface = Interface(
+    1.5,          // n: index of the medium below, against air
+    0.12,         // alpha: width of the facets, mean of the axes
+    0.030373108,  // tilt: turn of the mean facet towards a grazing direction
+    0.051016223,  // gain: part of the reflected light that a second facet lets in
+    0.003645085,  // lengthening: path added by the spread of refracted directions, in thicknesses
+    0.8614657     // drift: scale of the path added at grazing angles
+);
+
+const Lambert lf_white = Lambert(
+    vec3(0.7, 0.55, 0.55)   // albedo: part of the light that is sent back
+);
+
+const vec3 lf_white_returned = vec3(1.4800068, 1.0525558, 1.1574973);
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+}
+
+// The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.
+float lf_rarer_cosine(float c, float eta) {
+    return eta >= 1.0 ? c : sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0)) / eta;
+}
+
+// sqrt(c) as -1 to 1, from where a film's polynomial begins.
+float lf_chebyshev_argument(float c) {
+    return max((2.0 * sqrt(max(c, 0.0)) - 1.06) / 0.94, -1.0);
+}
+
+// What Schlick's formula takes for f0 of a coat with a film, in daylight; `c` on the rarer side.
+vec3 lf_film_on_coat(Coat coat, float c) {
+    float s = lf_chebyshev_argument(c);
+    vec3 total = coat.film_8 + 2.0 * s * coat.film_9;
+    vec3 total2 = coat.film_7 + 2.0 * s * total - coat.film_9;
+    total = coat.film_6 + 2.0 * s * total2 - total;
+    total2 = coat.film_5 + 2.0 * s * total - total2;
+    total = coat.film_4 + 2.0 * s * total2 - total;
+    total2 = coat.film_3 + 2.0 * s * total - total2;
+    total = coat.film_2 + 2.0 * s * total2 - total;
+    total2 = coat.film_1 + 2.0 * s * total - total2;
+    return coat.film_0 + s * total2 - total;
+}
+
+// Schlick 1994, eq. 15, from the reflectance at normal incidence.
+vec3 lf_fresnel_schlick(float c, vec3 f0) {
+    float m = 1.0 - c;
+    float m2 = m * m;
+    return f0 + (1.0 - f0) * (m2 * m2 * m);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec3 lf_half_vector(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return s / sqrt(max(dot(s, s), 1e-20));
+}
+
+// GGX density of facet normals (Walter et al. 2007, eq. 33).
+float lf_ggx_d(vec3 h, float alpha) {
+    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
+    float root = 1.0 / (e * alpha);
+    return root * root / 3.1415927;
+}
+
+// NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
+float lf_ggx_projection(vec3 w, float alpha) {
+    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
+// Cosine between a direction and the facets that it meets.
+float lf_facet_cosine(vec3 w, float tilt) {
+    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
+vec3 lf_with_second_facet(vec3 T, float gain) {
+    return T + (1.0 - T) * gain;
+}
+
+// Path added near grazing angles, where the facets that face the light take most of it.
+float lf_drift(vec3 w, float scale, float alpha) {
+    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+}
+
+// Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
+vec3 lf_refract_about_normal(vec3 w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
+    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+}
+
+// Width of the refracted directions over the width of the facets, to first order in slope.
+float lf_slope_spread(float c, float eta) {
+    float delta = (eta - 1.0) * (eta + 1.0);
+    float g = sqrt(max(delta + c * c, 0.0));
+    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
+}
+
+// Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
+Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
+    float c = lf_facet_cosine(w, interface_.tilt);
+    float c_energy = coat.eta >= 1.0 ? c : w.z;
+    float c2 = lf_rarer_cosine(c_energy, coat.eta);
+    vec3 t = lf_film_on_coat(coat, c2);
+    vec3 below = 1.0 - min(max(lf_fresnel_schlick(c2, t) * 200.0, 0.0), 1.0);
+    vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c2 * (5.0 - c2 * (10.0 - c2 * (10.0 - c2 * (5.0 - c2))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
+    float grazing = lf_drift(w, interface_.drift, interface_.alpha);
+    below = lf_refract_about_normal(air, interface_.n);
+    return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
+}
+
+// Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
+vec3 lf_transmittance(vec3 tau, float path) {
+    return exp(-(tau * path));
+}
+
+// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
+vec3 lf_evaluate(vec3 wi, vec3 wo) {
+    bool lit = wi.z > 0.0 && wo.z > 0.0;
+    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
+    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    float c = lf_rarer_cosine(lf_half_cosine(wi, wo), lf_lacquer.eta);
+    vec3 reflected = lf_fresnel_schlick(c, lf_film_on_coat(lf_lacquer, c));
+    vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
+    vec3 F = min(max(reflected, 0.0), 1.0) + 0.0025 * (below * below);
+    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_lacquer.alpha);
+    float projection_i = lf_ggx_projection(wi, lf_lacquer.alpha);
+    float projection_o = lf_ggx_projection(wo, lf_lacquer.alpha);
+    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    vec3 f = F * D * V;
+    Crossing i = lf_cross(lf_lacquer_interface, lf_lacquer, wi, wi);
+    Crossing o = lf_cross(lf_lacquer_interface, lf_lacquer, wo, wo);
+    vec3 throughput = i.T * o.T / (lf_lacquer.eta * lf_lacquer.eta);
+    float straight = 1.0 / max(i.w.z, 1e-14) + 1.0 / max(o.w.z, 1e-14);
+    float added = i.lengthening + o.lengthening;
+    vec3 diffuse = lf_transmittance(lf_lacquer.tau, straight + added);
+    reflected = lf_white.albedo / 3.1415927 * lf_white_returned;
+    f = f + throughput * diffuse * reflected;
+    return lit ? f : vec3(0.0);
+}
+
+// BRDF [1/sr] in any frame.
+vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
+    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
+    return lf_evaluate(surface * l, surface * v);
+}
+
+#ifndef LF_LIBRARY
+
+#ifndef LF_LIGHTS
+#define LF_LIGHTS 1
+#endif
+
+in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
+in vec3 v_normal;
+out vec4 color;
+
+uniform vec3 u_eye;
+uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
+uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
+
+// Unit direction l to a light and the irradiance on a surface that faces it.
+vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
+    vec3 away = light.xyz - position * light.w;
+    float distance2 = dot(away, away);
+    l = away * inversesqrt(distance2);
+    return rgb / (light.w > 0.0 ? distance2 : 1.0);
+}
+
+// Linear radiance, or sRGB (IEC 61966-2-1) for a screen when LF_SRGB is defined.
+vec3 lf_output(vec3 radiance) {
+#ifdef LF_SRGB
+    vec3 x = clamp(radiance, 0.0, 1.0);
+    return mix(12.92 * x, 1.055 * pow(max(x, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
+#else
+    return radiance;
+#endif
+}
+
+void main() {
+    vec3 n = normalize(v_normal);
+    vec3 v = normalize(u_eye - v_position);
+    vec3 radiance = vec3(0.0);
+    for (int k = 0; k < LF_LIGHTS; ++k) {
+        vec3 l;
+        vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
+        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+    }
+    color = vec4(lf_output(radiance), 1.0);
+}
+
+#endif

@@ -1,0 +1,232 @@
+#version 330 core
+// rose_porcelain: Coat over KubelkaMunk.
+// Printed by layerfit 0.1.0 from its precise form.
+// Left out, because this material does without: glaze: absorption, glaze: anisotropy.
+//
+// vec3 lf_brdf(vec3 n, vec3 v, vec3 l) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
+// the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
+// Define LF_LIBRARY to take the functions without the entry point below.
+
+struct Coat {
+    float alpha;  // width of the facet slopes; the square of an artist's roughness
+    float eta;    // index of refraction, against air
+};
+
+struct Interface {
+    float tilt;        // turn of the mean facet towards a grazing direction
+    float gain;        // part of the reflected light that a second facet lets in
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec4 passed_high;  // the other four, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface
+    vec4 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it
+    vec4 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec4 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec4 theta_high;   // 
+};
+
+struct Lambert {
+    vec3 albedo;  // part of the light that is sent back
+};
+
+struct Crossing {
+    vec3 w;       // median direction
+    float T;      // energy that passes
+    float a;      // spread, as a width
+    float path;   // mean path, in thicknesses
+    float theta;  // scale of the path's distribution
+    float s;      // argument of the baked curves
+};
+
+const Coat lf_glaze = Coat(
+    0.03,  // alpha: width of the facet slopes; the square of an artist's roughness
+    1.5    // eta: index of refraction, against air
+);
+
+const Interface lf_glaze_interface = Interface(
+    0.005488347,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.0035753467,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.005732365, 0.01541617, -0.015023942, 0.016766172),    // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.04286533, 0.02535144, 0.037844244, -0.03205738),      // passed_high: the other four, of higher powers
+    vec4(1.0028795, -0.0064911246, 0.009341955, -0.0077381134),   // bend: sine of the refracted light over that at a smooth interface
+    vec4(0.000739336, -0.0053653717, 0.016946077, -0.009879112),  // bend_high: 
+    vec4(0.61459345, -0.2803266, 0.014296204, 0.06077385),        // spread: width of a lobe seen through it
+    vec4(0.1096195, -0.4286654, 0.34889567, -0.06969261),         // spread_high: 
+    vec4(1.0063267, -0.018037766, 0.0151439905, -0.004645586),    // path: mean path over that of the refracted direction
+    vec4(0.058966875, -0.092886925, 0.005291939, 0.03040266),     // path_high: 
+    vec4(0.011289647, -0.044573322, 0.061082434, 0.08958986),     // theta: scale of the path's distribution
+    vec4(0.02857621, -0.4663041, 0.10433317, 0.24140999)          // theta_high: 
+);
+
+const Lambert lf_paint = Lambert(
+    vec3(0.6914125, 0.1957665, 0.46559197)   // albedo: part of the light that is sent back
+);
+
+const float lf_paint_returned = 0.59207493;
+
+// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+float lf_grazing(float NoW) {
+    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+}
+
+// Cosine between a direction and the facets that it meets.
+float lf_facet_cosine(vec3 w, float tilt) {
+    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
+float lf_transmittance_dielectric(float c, float eta) {
+    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float eta2 = eta * eta;
+    float perpendicular = c + g;
+    float parallel = eta2 * c + g;
+    float product = 2.0 * c * g;
+    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
+    return eta == 1.0 ? 1.0 : passed;
+}
+
+// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
+float lf_with_second_facet(float T, float gain) {
+    return T + (1.0 - T) * gain;
+}
+
+// A polynomial of eight coefficients at s.
+float lf_curve(vec4 low, vec4 high, float s) {
+    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+}
+
+// Follow one direction through the coat's rough top.
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w) {
+    float s = lf_grazing(w.z);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
+    T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
+    T = min(T, 1.0);
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
+    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    bend = min(bend, 0.9998 / max(sine, 1e-06));
+    sine = sine * bend;
+    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
+    float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+}
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+}
+
+// Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
+float lf_fresnel_dielectric(float c, float eta) {
+    float delta = (eta - 1.0) * (eta + 1.0);
+    float g2 = delta + c * c;
+    bool refracts = g2 > 1e-08;
+    float g = sqrt(refracts ? g2 : 1.0);
+    float eta2 = eta * eta;
+    float perpendicular = (c + g) * (c + g);
+    float parallel = (eta2 * c + g) * (eta2 * c + g);
+    float rs = -delta / perpendicular;
+    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float reflectance = 0.5 * (rs * rs + rp * rp);
+    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec3 lf_half_vector(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return s / sqrt(max(dot(s, s), 1e-20));
+}
+
+// GGX density of facet normals (Walter et al. 2007, eq. 33).
+float lf_ggx_d(vec3 h, float alpha) {
+    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
+    float root = 1.0 / (e * alpha);
+    return root * root / 3.1415927;
+}
+
+// NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
+float lf_ggx_projection(vec3 w, float alpha) {
+    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
+// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
+vec3 lf_evaluate(vec3 wi, vec3 wo) {
+    bool lit = wi.z > 0.0 && wo.z > 0.0;
+    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
+    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    Crossing crossing = lf_pass_interface(lf_glaze_interface, lf_glaze.eta, lf_glaze.alpha, wi);
+    Crossing crossing2 = lf_pass_interface(lf_glaze_interface, lf_glaze.eta, lf_glaze.alpha, wo);
+    float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_glaze.eta);
+    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_glaze.alpha);
+    float projection_i = lf_ggx_projection(wi, lf_glaze.alpha);
+    float projection_o = lf_ggx_projection(wo, lf_glaze.alpha);
+    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float throughput = crossing.T * crossing2.T / (lf_glaze.eta * lf_glaze.eta);
+    return lit ? F * D * V + throughput * (lf_paint.albedo / 3.1415927) / max(1.0 - lf_paint.albedo * lf_paint_returned, 1e-06) : vec3(0.0);
+}
+
+// BRDF [1/sr] in any frame.
+vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
+    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
+    return lf_evaluate(surface * l, surface * v);
+}
+
+#ifndef LF_LIBRARY
+
+#ifndef LF_LIGHTS
+#define LF_LIGHTS 1
+#endif
+
+in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
+in vec3 v_normal;
+out vec4 color;
+
+uniform vec3 u_eye;
+uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
+uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
+
+// Unit direction l to a light and the irradiance on a surface that faces it.
+vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
+    vec3 away = light.xyz - position * light.w;
+    float distance2 = dot(away, away);
+    l = away * inversesqrt(distance2);
+    return rgb / (light.w > 0.0 ? distance2 : 1.0);
+}
+
+// Linear radiance, or sRGB (IEC 61966-2-1) for a screen when LF_SRGB is defined.
+vec3 lf_output(vec3 radiance) {
+#ifdef LF_SRGB
+    vec3 x = clamp(radiance, 0.0, 1.0);
+    return mix(12.92 * x, 1.055 * pow(max(x, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
+#else
+    return radiance;
+#endif
+}
+
+void main() {
+    vec3 n = normalize(v_normal);
+    vec3 v = normalize(u_eye - v_position);
+    vec3 radiance = vec3(0.0);
+    for (int k = 0; k < LF_LIGHTS; ++k) {
+        vec3 l;
+        vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
+        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+    }
+    color = vec4(lf_output(radiance), 1.0);
+}
+
+#endif

@@ -1,0 +1,301 @@
+#version 330 core
+// varnished_wood_270um: Coat over OrenNayar.
+// Printed by layerfit 0.1.0 from its precise form.
+// Left out, because this material does without: varnish: anisotropy.
+//
+// vec3 lf_brdf(vec3 n, vec3 v, vec3 l) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
+// the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
+// Define LF_LIBRARY to take the functions without the entry point below.
+
+struct Coat {
+    float alpha;  // width of the facet slopes; the square of an artist's roughness
+    float eta;    // index of refraction, against air
+    vec3 tau;     // optical depth, one way at normal incidence
+};
+
+struct Interface {
+    float tilt;        // turn of the mean facet towards a grazing direction
+    float gain;        // part of the reflected light that a second facet lets in
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec4 passed_high;  // the other four, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface
+    vec4 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it
+    vec4 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec4 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec4 theta_high;   // 
+};
+
+struct OrenNayar {
+    vec3 albedo;  // part of the light that is sent back
+    float sigma;  // standard deviation of the facet angle [rad]
+};
+
+struct Crossing {
+    vec3 w;       // median direction
+    float T;      // energy that passes
+    float a;      // spread, as a width
+    float path;   // mean path, in thicknesses
+    float theta;  // scale of the path's distribution
+    float s;      // argument of the baked curves
+};
+
+const Coat lf_varnish = Coat(
+    0.08,                     // alpha: width of the facet slopes; the square of an artist's roughness
+    1.5,                      // eta: index of refraction, against air
+    vec3(0.216, 0.54, 1.35)   // tau: optical depth, one way at normal incidence
+);
+
+const Interface lf_varnish_interface = Interface(
+    0.019120086,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.02422721,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.017708257, 0.031569272, -0.022334382, 0.008231912),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(0.028344193, -0.04514841, -0.003954705, 0.019649286),   // passed_high: the other four, of higher powers
+    vec4(1.0192075, -0.039161414, 0.040671587, -0.03711748),     // bend: sine of the refracted light over that at a smooth interface
+    vec4(0.056702375, -0.035250664, -0.03293705, 0.031222343),   // bend_high: 
+    vec4(0.6141141, -0.303111, 0.13000849, -0.27796412),         // spread: width of a lobe seen through it
+    vec4(0.41097283, -0.108875036, -0.2716086, 0.17487288),      // spread_high: 
+    vec4(1.0303978, -0.07386291, 0.0952425, -0.11105347),        // path: mean path over that of the refracted direction
+    vec4(0.09069204, 0.010650635, -0.07378054, 0.03361559),      // path_high: 
+    vec4(0.061837524, -0.16732457, 0.2526343, -0.15407254),      // theta: scale of the path's distribution
+    vec4(0.10470186, -0.26747897, -0.06905809, 0.27396303)       // theta_high: 
+);
+
+const OrenNayar lf_wood = OrenNayar(
+    vec3(0.53, 0.3, 0.14),  // albedo: part of the light that is sent back
+    0.25                    // sigma: standard deviation of the facet angle [rad]
+);
+
+const vec3 lf_wood_returned = vec3(0.23611192, 0.07705591, 0.006491103);
+
+// log(1 + x) without the cancellation near 0.
+float lf_log1p(float x) {
+    if (abs(x) > 0.3) {
+        return log(1.0 + x);
+    }
+    float s = x / (2.0 + x);
+    float u = s * s;
+    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+}
+
+vec3 lf_log1p(vec3 x) {
+    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
+}
+
+// Angle of the point (x, y) by a polynomial (relative error 2e-8): some drivers' atan is off by 2e-4.
+float lf_atan2(float y, float x) {
+    float ax = abs(x);
+    float ay = abs(y);
+    float t = min(ax, ay) / max(max(ax, ay), 1e-30);
+    float u = t * t;
+    float p = 0.10622653 + u * (-0.07465779 + u * (0.042241037 + u * (-0.015793836 + u * 0.0027817077)));
+    float a = t * (1.0 + u * (-0.33333045 + u * (0.19992018 + u * (-0.1419892 + u * p))));
+    a = ay > ax ? 1.5707964 - a : a;
+    a = x < 0.0 ? 3.1415927 - a : a;
+    return y < 0.0 ? -a : a;
+}
+
+// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+float lf_grazing(float NoW) {
+    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+}
+
+// Cosine between a direction and the facets that it meets.
+float lf_facet_cosine(vec3 w, float tilt) {
+    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
+float lf_transmittance_dielectric(float c, float eta) {
+    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float eta2 = eta * eta;
+    float perpendicular = c + g;
+    float parallel = eta2 * c + g;
+    float product = 2.0 * c * g;
+    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
+    return eta == 1.0 ? 1.0 : passed;
+}
+
+// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
+float lf_with_second_facet(float T, float gain) {
+    return T + (1.0 - T) * gain;
+}
+
+// A polynomial of eight coefficients at s.
+float lf_curve(vec4 low, vec4 high, float s) {
+    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+}
+
+// Follow one direction through the coat's rough top.
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w) {
+    float s = lf_grazing(w.z);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
+    T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
+    T = min(T, 1.0);
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
+    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    bend = min(bend, 0.9998 / max(sine, 1e-06));
+    sine = sine * bend;
+    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
+    float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+}
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+}
+
+// Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
+float lf_fresnel_dielectric(float c, float eta) {
+    float delta = (eta - 1.0) * (eta + 1.0);
+    float g2 = delta + c * c;
+    bool refracts = g2 > 1e-08;
+    float g = sqrt(refracts ? g2 : 1.0);
+    float eta2 = eta * eta;
+    float perpendicular = (c + g) * (c + g);
+    float parallel = (eta2 * c + g) * (eta2 * c + g);
+    float rs = -delta / perpendicular;
+    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float reflectance = 0.5 * (rs * rs + rp * rp);
+    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec3 lf_half_vector(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return s / sqrt(max(dot(s, s), 1e-20));
+}
+
+// GGX density of facet normals (Walter et al. 2007, eq. 33).
+float lf_ggx_d(vec3 h, float alpha) {
+    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
+    float root = 1.0 / (e * alpha);
+    return root * root / 3.1415927;
+}
+
+// NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
+float lf_ggx_projection(vec3 w, float alpha) {
+    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
+// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
+vec3 lf_absorbed(float path, float theta, vec3 tau) {
+    float scale = max(theta, 1e-06);
+    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
+}
+
+// Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection.
+vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
+    float sigma2 = sigma * sigma;
+    float c1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33);
+    float c2 = 0.45 * sigma2 / (sigma2 + 0.09);
+    float c3 = 0.125 * sigma2 / (sigma2 + 0.09);
+    float c4 = 0.17 * sigma2 / (sigma2 + 0.13);
+    float sin_i = sqrt(max(wi.x * wi.x + wi.y * wi.y, 0.0));
+    float sin_o = sqrt(max(wo.x * wo.x + wo.y * wo.y, 0.0));
+    float elevation_i = lf_atan2(wi.z, sin_i) * 0.63661975;
+    float elevation_o = lf_atan2(wo.z, sin_o) * 0.63661975;
+    float higher = max(elevation_i, elevation_o);
+    float lower_cos = min(wi.z, wo.z);
+    float larger_cos = max(wi.z, wo.z);
+    float larger_sin = max(sin_i, sin_o);
+    float dot_xy = wi.x * wo.x + wi.y * wo.y;
+    float cos_phi = dot_xy / max(sin_i * sin_o, 1e-14);
+    float sin_phi = (wi.x * wo.y - wi.y * wo.x) / max(sin_i * sin_o, 1e-14);
+    float aside = sin_phi * sin_phi / (1.0 + abs(cos_phi));
+    float forward = dot_xy / larger_cos;
+    float gap = higher * (3.0 - higher * (3.0 - higher)) - lower_cos * lower_cos / (1.0 + larger_sin);
+    float backward = dot_xy * gap / max(larger_cos * larger_sin, 1e-14);
+    float tan_mean = (sin_i + sin_o) / (wi.z + wo.z);
+    float smaller = 1.0 - higher;
+    float product = smaller * (1.0 - min(elevation_i, elevation_o));
+    float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
+    direct = direct + aside * c3 * (product * product) * tan_mean;
+    float interreflected = c4 * (1.0 - cos_phi * (smaller * smaller));
+    return albedo / 3.1415927 * (direct + albedo * interreflected);
+}
+
+// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
+vec3 lf_evaluate(vec3 wi, vec3 wo) {
+    bool lit = wi.z > 0.0 && wo.z > 0.0;
+    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
+    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    Crossing crossing = lf_pass_interface(lf_varnish_interface, lf_varnish.eta, lf_varnish.alpha, wi);
+    Crossing crossing2 = lf_pass_interface(lf_varnish_interface, lf_varnish.eta, lf_varnish.alpha, wo);
+    float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_varnish.eta);
+    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_varnish.alpha);
+    float projection_i = lf_ggx_projection(wi, lf_varnish.alpha);
+    float projection_o = lf_ggx_projection(wo, lf_varnish.alpha);
+    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float throughput = crossing.T * crossing2.T / (lf_varnish.eta * lf_varnish.eta);
+    vec3 A = lf_absorbed(crossing.path, crossing.theta, lf_varnish.tau) * lf_absorbed(crossing2.path, crossing2.theta, lf_varnish.tau);
+    return lit ? F * D * V + throughput * A * lf_oren_nayar_full(crossing.w, crossing2.w, lf_wood.albedo, lf_wood.sigma) / max(1.0 - lf_wood.albedo * lf_wood_returned, 1e-06) : vec3(0.0);
+}
+
+// BRDF [1/sr] in any frame.
+vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
+    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
+    return lf_evaluate(surface * l, surface * v);
+}
+
+#ifndef LF_LIBRARY
+
+#ifndef LF_LIGHTS
+#define LF_LIGHTS 1
+#endif
+
+in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
+in vec3 v_normal;
+out vec4 color;
+
+uniform vec3 u_eye;
+uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
+uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
+
+// Unit direction l to a light and the irradiance on a surface that faces it.
+vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
+    vec3 away = light.xyz - position * light.w;
+    float distance2 = dot(away, away);
+    l = away * inversesqrt(distance2);
+    return rgb / (light.w > 0.0 ? distance2 : 1.0);
+}
+
+// Linear radiance, or sRGB (IEC 61966-2-1) for a screen when LF_SRGB is defined.
+vec3 lf_output(vec3 radiance) {
+#ifdef LF_SRGB
+    vec3 x = clamp(radiance, 0.0, 1.0);
+    return mix(12.92 * x, 1.055 * pow(max(x, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
+#else
+    return radiance;
+#endif
+}
+
+void main() {
+    vec3 n = normalize(v_normal);
+    vec3 v = normalize(u_eye - v_position);
+    vec3 radiance = vec3(0.0);
+    for (int k = 0; k < LF_LIGHTS; ++k) {
+        vec3 l;
+        vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
+        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+    }
+    color = vec4(lf_output(radiance), 1.0);
+}
+
+#endif

@@ -1,0 +1,74 @@
+"""The presets that ship: where they are, and what each says of itself. Their numbers are read by `preset`."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ._data import shaders
+from .documents import nearest, read_document
+from .errors import InputError
+
+WORDS = ("group", "description", "source")
+"""Keys of a preset that are for people: what it is listed under, what it is in a line, and where its values are from."""
+
+GROUPS = ("car paint", "paint and enamel", "wood", "metal", "thin film", "patina and wear", "stone and ceramic")
+"""What presets are listed under, in this order."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Shipped:
+    """A preset that ships, in words."""
+
+    name: str
+    group: str
+    description: str
+    source: str
+    """Where its values are from, and which of them are chosen by eye."""
+    structure: str
+    """Its layers, outermost first, and the form that it is evaluated in."""
+    path: Path
+    """The JSON document. Beside it lie the printed shader, `.frag`, and its picture, `.png`."""
+
+
+def shipped_presets(word: str = "") -> list[Shipped]:
+    """The presets that ship, by group and name; with a `word`, those that have it in what they say of themselves.
+
+    `read_preset(name)` gives the material of one.
+    """
+    found = [_described(path) for path in (shaders() / "presets").glob("*.json")]
+    found = [one for one in found if word.casefold() in _text(one).casefold()]
+    return sorted(found, key=lambda one: (GROUPS.index(one.group), one.name))
+
+
+def find_preset(path: Path) -> Path:
+    """Where a preset is: a name without an ending that is no file here may be that of a shipped one."""
+    if path.suffix or path.exists():
+        return path
+    folder = shaders() / "presets"
+    names = sorted(file.stem for file in folder.glob("*.json"))
+    if path.name not in names:
+        raise InputError(
+            f"{path}: there is no such file, and no shipped preset of that name{nearest(path.name, names)}. "
+            "`layerfit presets` lists those that ship."
+        )
+    return folder / f"{path.name}.json"
+
+
+def _described(path: Path) -> Shipped:
+    document = read_document(path)
+    words = {key: document[key] for key in ("name", *WORDS)}
+    return Shipped(**words, structure=_structure(document), path=path)
+
+
+def _structure(document: Mapping[str, Any]) -> str:
+    layers = " over ".join(_layer(layer) for layer in (*document["layers"], document["base"]))
+    return f"{layers}, {document['model']}"
+
+
+def _layer(document: Mapping[str, Any]) -> str:
+    return f"{document['type']} with a film" if "film_nm" in document else document["type"]
+
+
+def _text(preset: Shipped) -> str:
+    return " ".join((preset.name, preset.group, preset.description, preset.structure))
