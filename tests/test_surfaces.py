@@ -33,7 +33,6 @@ from layerfit.shader.export import print_material
 from layerfit.shader.verify import check_pairs
 from layerfit.stack import Stack
 from layerfit.surfaces import BASES, Blinn, CookTorrance, Lafortune, Phong, TorranceSparrow
-from layerfit.walk import walk
 
 DTYPES = [np.float64, np.float32]
 
@@ -168,15 +167,13 @@ def test_a_published_base_that_gives_more_than_it_gets_is_white_at_most():
 
 
 @pytest.mark.parametrize("base", [LAFORTUNE, Phong(kd=WOOD), CookTorrance()], ids=["lafortune", "phong", "cook_torrance"])
-def test_the_precise_form_and_the_walk_refuse_them_and_say_why(base):
+def test_the_precise_form_refuses_them_and_says_why(base):
     kind = next(name for name, cls in BASES.items() if cls is type(base))
     document = {"model": "precise", "layers": [{"type": "coat"}], "base": {"type": kind}}
     with pytest.raises(InputError, match=r"base is neither diffuse alone .* nor a conductor"):
         stack_of(document, "here")
     del document["model"]
     assert "Corrected" in type(stack_of(document, "here").form).__name__
-    with pytest.raises(ValueError, match="no facets to walk on"):
-        walk(Stack((varnish(),), base), np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, 1.0]]), paths=1)
 
 
 @pytest.mark.parametrize("name", [n for n in STACKS if n.split(",")[0] in BASES])

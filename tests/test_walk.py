@@ -13,7 +13,7 @@ from helpers import direction
 from layerfit.layers import Coat
 from layerfit.optics.fresnel import fresnel_dielectric
 from layerfit.stack import Stack
-from layerfit.surfaces import Conductor, Lambert, OrenNayar
+from layerfit.surfaces import CarPaint, Conductor, Flakes, Lafortune, Lambert, OrenNayar
 from layerfit.walk import Estimate, Haze, scatter, top_lobe, walk, walk_rows
 
 FALSE_ALARM = 1e-4
@@ -85,6 +85,8 @@ RECIPROCAL = {
     "three layers, multi": (Stack((ROUGH, PRIMER), OrenNayar(albedo=0.7)), {"interface": "multi"}),
     "mixed distributions": (Stack((BECKMANN, PRIMER), COPPER), {"interface": "multi"}),
     "haze": (Stack((ROUGH,), COPPER), {"haze": {"coat": Haze(1.0, 0.5)}}),
+    "car paint": (Stack((GLOSS,), CarPaint(kd=0.3, ks=0.5, ks_2=0.8, f0_2=0.8, alpha_2=0.25)), {}),
+    "Lafortune, multi": (Stack((ROUGH,), Lafortune(kd=0.3, ks=0.5, exponent=10.0)), {"interface": "multi"}),
 }
 
 
@@ -169,6 +171,30 @@ def test_equal_widths_are_isotropic(distribution: Any, interface: Any) -> None:
     )
     a, b = (walk(stack, wi, wo, paths=2000, interface=interface) for stack in (round_, square))
     assert a.mean == pytest.approx(b.mean, rel=1e-5)
+
+
+@pytest.mark.parametrize("interface", ["single", "multi"])
+def test_a_base_by_its_formula_is_that_by_its_facets(interface: Any) -> None:
+    """Flakes in the mean are a Beckmann surface, which is walked on facet by facet."""
+    wi, wo = direction(40.0), [direction(30.0, 150.0), direction(45.0, 180.0), direction(70.0, 20.0)]
+    metal = {"eta": 0.2, "k": 3.5}
+    coat = Coat(alpha=0.2, eta=1.5, tau=0.1)
+    facets = Conductor(alpha=0.3 * np.sqrt(2.0), distribution="beckmann", **metal)
+    bases = Flakes(alpha=0.3, sigma=0.3, **metal), facets
+    a, b = (walk(Stack((coat,), x), wi, wo, paths=50_000, seed=k, interface=interface) for k, x in enumerate(bases))
+    assert agree(score(a, b)[:, 0])
+    assert np.all(a.se < 0.02 * a.mean)
+
+
+def test_a_base_of_parts_sends_back_their_sum_where_nothing_returns() -> None:
+    """Below a dark coat of nearly no index, one bounce is all: the walk is then linear in the base."""
+    wi, wo = direction(40.0), [direction(30.0, 150.0), direction(45.0, 180.0), direction(70.0, 20.0)]
+    coat = Coat(alpha=0.1, eta=1.02, tau=1.5)
+    both = CarPaint(kd=0.4, ks=0.6, alpha=0.3)
+    bases = both, CarPaint(ks=0.6, alpha=0.3), Lambert(albedo=0.4)
+    a, b, c = (walk(Stack((coat,), base), wi, wo, paths=20_000, seed=k, interface="multi") for k, base in enumerate(bases))
+    assert agree(score(a, Estimate(b.mean + c.mean, np.hypot(b.se, c.se)))[:, 0])
+    assert np.all(a.se < 0.02 * a.mean)
 
 
 def test_brushed_surface_turns_with_its_axes() -> None:

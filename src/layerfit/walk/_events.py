@@ -5,6 +5,8 @@ Each event samples where the particle goes on, and evaluates how much of it woul
 
 import math
 from collections.abc import Callable, Sequence
+from functools import reduce
+from operator import add
 from typing import Any
 
 import jax.numpy as jnp
@@ -172,17 +174,36 @@ def _seen(area_w: Scalar, w: Direction, area_d: Scalar, d: Direction, separable:
     return jnp.where(separable, 1.0 / jnp.maximum(area_d, _TINY), together)
 
 
-def at_diffuse(material: Material, w: Direction, target: Direction, u: Uniforms) -> Event:
-    """A diffuse base."""
-    radius = jnp.sqrt(u[1])
-    cos_phi, sin_phi = turn(u[2])
-    d = radius * cos_phi, radius * sin_phi, jnp.sqrt(1.0 - u[1])
+def at_formula(material: Material, w: Direction, target: Direction, u: Uniforms) -> Event:
+    """A base that is a formula, not facets: directions are drawn as its parts would send them, one part as often as another."""
+    base = material.base[0]
+    lobes = [(lobe.distribution, lobe.width if isinstance(lobe.width, tuple) else (lobe.width,) * 2) for lobe in base.lobes]
+    areas = [jnp.maximum(facet_area(kind, w, alpha), _TINY) for kind, alpha in lobes]
+
+    def density(to: Direction) -> Scalar:
+        h, _ = reflecting_facet(w, to)
+        parts = [0.25 * facet_density(kind, h, alpha) / area for (kind, alpha), area in zip(lobes, areas, strict=True)]
+        if base.diffuse is not None:
+            parts.append(to[2] / math.pi)
+        return reduce(add, parts) / len(parts)
+
+    ways = []
+    for kind, alpha in lobes:
+        m = sample_facet(kind, w, alpha, u[1], u[2])
+        ways.append(reflect(w, m, dot(w, m)))
+    if base.diffuse is not None:
+        radius = jnp.sqrt(u[1])
+        cos_phi, sin_phi = turn(u[2])
+        ways.append((radius * cos_phi, radius * sin_phi, jnp.sqrt(1.0 - u[1])))
+    d = pick(jnp.floor(u[3] * len(ways)), ways)
+    up = d[2] > 0.0
+    d = where(up, d, (0.0 * d[0], 0.0 * d[1], 0.0 * d[2] + 1.0))
     brdf = lambda to: tuple(b.evaluate(jnp.stack(w), jnp.stack(to)) for b in material.base)  # noqa: E731
-    yes = jnp.full(w[2].shape, True)
+    pdf = density(d)
+    weight = tuple(jnp.where(up, f * d[2] / jnp.maximum(pdf, _TINY), 0.0) for f in brdf(d))
+    yes, none = jnp.full(up.shape, True), jnp.zeros_like(w[2])
     c = None if material.interface == "single" else jnp.ones_like(w[2])
-    weight = tuple(math.pi * f for f in brdf(d))
-    none = jnp.zeros_like(w[2])
-    return Event(d, ~yes, yes, c, weight, d[2] / math.pi, brdf(target), target[2] / math.pi, none, none)
+    return Event(d, ~yes, yes, c, weight, pdf, brdf(target), density(target), none, none)
 
 
 def in_haze(material: Material, g: Scalar, w: Direction, target: Direction, u: Uniforms) -> Event:

@@ -10,7 +10,7 @@ from .._chunk import static, struct
 from .._types import Number, Scalar
 from ..optics.microfacet import Distribution
 from ..stack import Stack
-from ..surfaces.microfacet import Conductor, Dielectric, Microfacets
+from ..surfaces.microfacet import Microfacets
 from ._facets import Widths
 
 Interface = Literal["single", "multi"]
@@ -119,11 +119,6 @@ def check(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
             )
         if np.ndim(coat.eta) > 1:
             raise ValueError(f"coat {coat.name!r} has an index for every channel; a path has one direction: walk by channel")
-    if stack.base.lobes and not isinstance(stack.base, (Conductor, Dielectric)):
-        kind = type(stack.base).__name__
-        raise ValueError(
-            f"base {stack.base.name!r}: a {kind} is a formula, no facets to walk on; use a conductor or a diffuse base"
-        )
     if getattr(stack.base, "has_film", False):
         raise ValueError(
             f"base {stack.base.name!r} has a thin film, which the walk does not know: set film_nm and film_eta to None"

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 from .._chunk import struct
 from .._types import Flag, Scalar
 from ..surfaces.microfacet import Microfacets
-from ._events import Event, Uniforms, at_diffuse, at_facets, in_haze, pick
+from ._events import Event, Uniforms, at_facets, at_formula, in_haze, pick
 from ._facets import Direction, opposite, where
 from ._material import Material
 from ._random import Bits, uniforms
@@ -124,7 +124,7 @@ def _meet(material: Material, wo: Direction, p: Particle, u: Uniforms) -> Event:
     entering = (p.stage == EYE) | (p.stage == LIGHT)
     happened = at_facets(material, p.at, p.above, entering, p.w, p.c, target, u)
     if not isinstance(material.base[0], Microfacets):
-        happened = where(p.at == len(material.boundaries), at_diffuse(material, p.w, target, u), happened)
+        happened = where(p.at == len(material.boundaries), at_formula(material, p.w, target, u), happened)
     if p.haze is None:
         return happened
     g = pick(p.at - 1, [0.0 * u[0] if medium.haze is None else medium.haze.g for medium in material.media])
