@@ -147,7 +147,8 @@ class CarPaint(TwoParts):
         """The paint at a place of the surface."""
         kept = kept_tilt(place.distance, self.half_distance)
         slope = flake_tilt(place.uv, self.per_uv, kept, self.seed.astype(jnp.uint32))
-        return PaintThere(self, Tilt(slope, lost_variance(place.distance, self.half_distance)))
+        lost = lost_variance(place.distance, self.half_distance)
+        return PaintThere(self, Tilt(slope, lost))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -89,7 +89,8 @@ class Flakes(Metal):
         """The flake at a place of the surface."""
         kept = kept_tilt(place.distance, self.half_distance)
         tilt = flake_tilt(place.uv, self.per_uv, self.sigma * kept, self.seed.astype(jnp.uint32))
-        return Flake(self, tilt, lost_variance(place.distance, self.half_distance))
+        lost = lost_variance(place.distance, self.half_distance)
+        return Flake(self, tilt, lost)
 
 
 @dataclasses.dataclass(frozen=True)
