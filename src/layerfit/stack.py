@@ -64,7 +64,8 @@ class Stack:
         left = tuple(layer for layer in self.layers if layer.name != name)
         if len(left) == len(self.layers):
             raise KeyError(f"no layer called {name!r} to take off; there are {[layer.name for layer in self.layers]}")
-        return replace(self, layers=left)
+        # A bare base is the same in every form; the corrected one is for all materials, in a preset too.
+        return replace(self, layers=left, form=self.form if left else corrected.Corrected())
 
 
 prepared = Compiled(Stack.prepare, optimise=False)
