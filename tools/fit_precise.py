@@ -43,12 +43,7 @@ def make(path: Path, count: int, paths: int, seed: int, facets: str) -> None:
             base = {"albedo": rng.uniform(0.2, 0.95, n)}
             if kind == "conductor":
                 base = {"alpha": log(0.05, 0.8, n), "eta": rng.uniform(0.2, 3.0, n), "k": rng.uniform(1.5, 6.0, n)}
-            wi = _directions(rng, rng.uniform(0.0, np.radians(80.0), n))[:, None].repeat(VIEWS, 1)
-            wo = _directions(rng, np.arccos(rng.uniform(0.15, 1.0, (n, VIEWS))))
-            # Half of them about the mirror direction, where the light is.
-            near = wi[:, : VIEWS // 2] * [-1.0, -1.0, 1.0] + 0.25 * rng.normal(size=(n, VIEWS // 2, 3))
-            near[..., 2] = np.maximum(np.abs(near[..., 2]), 0.15)
-            wo[:, : VIEWS // 2] = near / np.linalg.norm(near, axis=-1, keepdims=True)
+            wi, wo = directions(rng, n, VIEWS)
             flat = lambda table: {key: value.repeat(VIEWS) for key, value in table.items()}  # noqa: E731
             surface = Lambert if kind == "lambert" else Conductor
             stack = Stack((Coat(**flat(coat), masking="smith_separable", distribution=facets),), surface(**flat(base)))
@@ -58,6 +53,16 @@ def make(path: Path, count: int, paths: int, seed: int, facets: str) -> None:
             saved |= {f"{name}_{key}": value for key, value in columns.items()}
             saved |= {f"{name}_f": found.mean.mean(-1).reshape(n, VIEWS), f"{name}_se": found.se.mean(-1).reshape(n, VIEWS)}
     np.savez_compressed(path, facets=facets, **saved)
+
+
+def directions(rng: np.random.Generator, n: int, views: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n, views, 3) each: of n lights up to 80 degrees, and of views, half of them about the mirror direction, where the light is."""
+    wi = _directions(rng, rng.uniform(0.0, np.radians(80.0), n))[:, None].repeat(views, 1)
+    wo = _directions(rng, np.arccos(rng.uniform(0.15, 1.0, (n, views))))
+    near = wi[:, : views // 2] * [-1.0, -1.0, 1.0] + 0.25 * rng.normal(size=(n, views // 2, 3))
+    near[..., 2] = np.maximum(np.abs(near[..., 2]), 0.15)
+    wo[:, : views // 2] = near / np.linalg.norm(near, axis=-1, keepdims=True)
+    return wi, wo
 
 
 def _directions(rng: np.random.Generator, theta: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from fit_precise import directions
 
 from layerfit.forms.corrected import Corrected
 from layerfit.layers import Coat
@@ -40,12 +41,7 @@ def make(path: Path, count: int, paths: int, seed: int, interface: Any) -> None:
         base = {"albedo": rng.uniform(0.0, 0.95, n)}
         if kind == "conductor":
             base = {"alpha": log(0.05, 0.8, n), "eta": rng.uniform(0.2, 3.0, n), "k": rng.uniform(1.5, 6.0, n)}
-        wi = _directions(rng, rng.uniform(0.0, np.radians(80.0), n))[:, None].repeat(VIEWS, 1)
-        wo = _directions(rng, np.arccos(rng.uniform(0.15, 1.0, (n, VIEWS))))
-        # Half of them about the mirror direction, where the light is.
-        near = wi[:, : VIEWS // 2] * [-1.0, -1.0, 1.0] + 0.25 * rng.normal(size=(n, VIEWS // 2, 3))
-        near[..., 2] = np.maximum(np.abs(near[..., 2]), 0.15)
-        wo[:, : VIEWS // 2] = near / np.linalg.norm(near, axis=-1, keepdims=True)
+        wi, wo = directions(rng, n, VIEWS)
         flat = lambda table: {key: value.repeat(VIEWS) for key, value in table.items()}  # noqa: E731
         stack = Stack((Coat(**flat(coat), masking="smith_separable"),), cls(**flat(base)))
         scatters = {"coat": Haze(**flat(haze))}
@@ -56,11 +52,6 @@ def make(path: Path, count: int, paths: int, seed: int, interface: Any) -> None:
         columns |= {"wi": wi, "wo": wo, "f": found.mean[:, 0].reshape(n, VIEWS), "se": found.se[:, 0].reshape(n, VIEWS)}
         saved |= {f"{kind}_{key}": value for key, value in columns.items()}
     np.savez_compressed(path, **saved)
-
-
-def _directions(rng: np.random.Generator, theta: np.ndarray) -> np.ndarray:
-    phi = rng.uniform(0.0, 2.0 * np.pi, theta.shape)
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
 
 
 def rows(paths: list[Path], kind: str) -> dict[str, np.ndarray]:

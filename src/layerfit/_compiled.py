@@ -24,7 +24,7 @@ CLOCK = Clock()
 
 OPTIONS: Any = {"xla_disable_hlo_passes": "call-inliner", "xla_cpu_use_fusion_emitters": False}
 """Shading functions stay functions: inlined, they are fused to loops of a thousand operations, which LLVM no longer vectorises (two
-to four times slower)."""
+to four times slower). XLA's newer emitters of fused loops are off: they take up to twice as long to compile these."""
 
 _POOL = ThreadPoolExecutor(2, "compile")
 

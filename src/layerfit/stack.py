@@ -11,7 +11,6 @@ from ._compiled import Compiled
 from ._place import Place, needs, reads
 from ._types import Colour, Vec3
 from .forms import corrected, faithful, patina, precise, weathering
-from .surfaces.film import Filmed
 
 Form = faithful.Faithful | corrected.Corrected | precise.Precise
 FORMS = {faithful.Faithful: faithful, corrected.Corrected: corrected, precise.Precise: precise}
@@ -43,11 +42,6 @@ class Stack:
         if reason := form.refuses(self.layers, self.base):
             raise ValueError(f"the {type(self.form).__name__.lower()} form is not for this material: {reason}")
         return form.prepare(self.layers, self.base, self.form)
-
-    def in_channels(self) -> "Stack":
-        """The same material for a map over its colour channels: layers that have to know which one they are seen in are told."""
-        *layers, base = (x.in_channels() if isinstance(x, Filmed) else x for x in (*self.layers, self.base))
-        return replace(self, layers=tuple(layers), base=base)
 
     @property
     def reads(self) -> tuple[str, ...]:

@@ -13,7 +13,6 @@ from .._compiled import CLOCK
 from .._place import narrowed
 from ..capture.samples import QUADRATURE, Samples, View
 from ..errors import InputError
-from ..render import predict
 from ..stack import Stack
 from .blocks import Block, arrange, channels_first
 from .parameters import Parametrisation, parametrise, with_fixed
@@ -156,7 +155,7 @@ class _Fit:
     def _models(self, u: np.ndarray) -> list[np.ndarray]:
         stack = self._material(u)
         return [
-            predict(scaled(stack, view.scales(stack)), s.wi, s.wo, s.weight, narrowed(s.place, stack.needs))
+            render.predict(scaled(stack, view.scales(stack)), s.wi, s.wo, s.weight, narrowed(s.place, stack.needs))
             for view, s in zip(self.views, self.samples, strict=True)
         ]
 

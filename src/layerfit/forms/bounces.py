@@ -18,6 +18,7 @@ from .._chunk import chunk, member, safe_divide, safe_power, safe_sqrt, struct, 
 from .._types import Colour, Scalar
 from ..layers import Coat
 from ..optics.fresnel import fresnel_dielectric
+from ..optics.microfacet import ggx_lambda
 from ..surfaces.microfacet import Conductor
 from .curves import CELLS, Nodes, P, absorbed, diffuse_return, hemispherical, polynomial, presence
 
@@ -161,6 +162,5 @@ def _facets(z: Scalar, alpha: Scalar) -> tuple[Float[Array, " s"], Float[Array, 
 
 
 def _lambda(z: Any, alpha: Any) -> Any:
-    """Lambda of the GGX distribution (Heitz 2014, eq. 72), by the cosine."""
-    x = alpha * alpha * ((1.0 - z) * (1.0 + z) / (z * z))
-    return 0.5 * x / (1.0 + jnp.sqrt(1.0 + x))
+    """Lambda of the GGX distribution, by the cosine."""
+    return ggx_lambda(alpha * alpha * ((1.0 - z) * (1.0 + z) / (z * z)))

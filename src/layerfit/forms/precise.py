@@ -18,7 +18,7 @@ from .._chunk import chunk, clip, member, safe_power, safe_sqrt, struct, where
 from .._types import Colour, Number, Scalar, Vec3
 from ..layers import Coat
 from ..optics.interface import facet_cosine, rough_transmittance
-from ..optics.microfacet import half_cosine
+from ..optics.microfacet import ggx_lambda, half_cosine
 from ..surfaces.microfacet import Conductor
 from .bounces import Curve, amount, bounces, wider
 from .curves import Interface, P, absorbed, bake, curve, diffuse_return, grazing, presence
@@ -103,10 +103,8 @@ class Crossing:
 
 
 def prepare(coats: tuple[Coat, ...], base: Any, options: Precise) -> Prepared:
-    """Look up what the interface does and bake it. Raises ValueError for a material that is not of this form."""
-    if reason := refuses(coats, base):
-        raise ValueError(f"the precise form is not for this material: {reason}")
-    coat = coats[0]
+    """Look up what the interface does and bake it, for a material that `refuses` has nothing against."""
+    (coat,) = coats
     interface, nodes = bake(coat.eta, crossed(coat), options.interface)
     coat = coat.below(jnp.ones_like(coat.eta))
     base = base.below(coat.eta)
@@ -251,7 +249,6 @@ def lobe(i: Crossing, o: Crossing, yi: Vec3, yo: Vec3, alpha: Scalar, masked: Sc
 
 @chunk
 def smith_lambda(w: Vec3, alpha: Scalar) -> Scalar:
-    """Lambda of the GGX distribution (Heitz 2014, eq. 72)."""
+    """Lambda of the GGX distribution."""
     tan2 = (w[0] * w[0] + w[1] * w[1]) / (w[2] * w[2])
-    x = alpha * alpha * tan2
-    return 0.5 * x / (1.0 + jnp.sqrt(1.0 + x))
+    return ggx_lambda(alpha * alpha * tan2)

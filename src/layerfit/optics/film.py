@@ -19,7 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import chunk, safe_sqrt
+from .._chunk import chunk, safe_sqrt, where
 from .._types import Colour, Number, Scalar
 from .spectra import WAVELENGTHS_NM, daylight_weights
 
@@ -92,7 +92,7 @@ def _root(p: Colour, h: Colour) -> tuple[Colour, Colour]:
     q = jnp.sqrt(jnp.maximum(p * p + 4.0 * h * h, 1e-36))
     larger = jnp.sqrt(0.5 * (q + jnp.abs(p)))
     smaller = h / larger
-    return jnp.where(p < 0.0, smaller, larger), jnp.where(p < 0.0, larger, smaller)
+    return where(p < 0.0, smaller, larger), where(p < 0.0, larger, smaller)
 
 
 def _standing(x: Colour, thickness: Colour) -> tuple[Colour, Colour, Colour]:
@@ -103,17 +103,17 @@ def _standing(x: Colour, thickness: Colour) -> tuple[Colour, Colour, Colour]:
     k = 2.0 * math.pi * thickness
     z = k * k * x
     thin = jnp.abs(z) < 1.0
-    root = jnp.sqrt(jnp.where(thin, 1.0, jnp.abs(x)))
-    turns = jnp.where(thin, 0.0, thickness * root)
+    root = jnp.sqrt(where(thin, 1.0, jnp.abs(x)))
+    turns = where(thin, 0.0, thickness * root)
     phase = 2.0 * math.pi * (turns - jnp.floor(turns))  # of many turns, float32 would lose the last one's digits
     fading = jnp.exp(-4.0 * math.pi * turns)
     fades = x < 0.0
-    C = jnp.where(fades, 0.5 + 0.5 * fading, jnp.cos(phase))
-    S = jnp.where(fades, 0.5 - 0.5 * fading, jnp.sin(phase)) / root
-    near = jnp.where(thin, z, 0.0)
-    C = jnp.where(thin, _series(near, 0), C)
-    S = jnp.where(thin, k * _series(near, 1), S)
-    return C, S, jnp.where(fades & ~thin, fading, 1.0)
+    C = where(fades, 0.5 + 0.5 * fading, jnp.cos(phase))
+    S = where(fades, 0.5 - 0.5 * fading, jnp.sin(phase)) / root
+    near = where(thin, z, 0.0)
+    C = where(thin, _series(near, 0), C)
+    S = where(thin, k * _series(near, 1), S)
+    return C, S, where(fades & ~thin, fading, 1.0)
 
 
 def _series(z: Colour, odd: int) -> Colour:
@@ -125,18 +125,15 @@ def _series(z: Colour, odd: int) -> Colour:
 
 
 @jax.jit
-def bake(film_eta: Number, eta: Number, k: Number, film_nm: Number, channel: Number = None) -> tuple[Colour, ...]:
+def bake(film_eta: Number, eta: Number, k: Number, film_nm: Number) -> tuple[Colour, ...]:
     """f0 for which Schlick's formula is a film's reflectance in daylight: `TERMS` Chebyshev coefficients in `chebyshev_argument(c)`.
 
-    `film_nm` is the thickness times the index of the medium above. Colours of (3,) give coefficients of (3,); one `channel`, 0 to 2,
-    of which the numbers are, gives numbers. By way of f0 both the reflectance of a film that hardly reflects and the transmittance at
-    grazing angles keep their digits.
+    `film_nm` is the thickness times the index of the medium above. Coefficients are colours of (3,). By way of f0 both the
+    reflectance of a film that hardly reflects and the transmittance at grazing angles keep their digits.
     """
     film_eta, eta, k, film_nm = map(jnp.asarray, (film_eta, eta, k, film_nm))
     cosines, fit = (jnp.asarray(x, film_nm.dtype) for x in _fit())
     weights, wavelengths = (jnp.asarray(x, film_nm.dtype) for x in (daylight_weights(), WAVELENGTHS_NM))
-    if channel is not None:
-        weights = jnp.take(weights, jnp.round(channel).astype(int), axis=1)
 
     def light(of_wave: Any, c: Scalar) -> Colour:
         values = jax.vmap(lambda wavelength: of_wave(c, film_eta, eta, k, film_nm / wavelength))(wavelengths)

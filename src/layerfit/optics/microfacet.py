@@ -8,7 +8,7 @@ two cosines loses its value at grazing angles.
 """
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -69,6 +69,11 @@ def density(distribution: Distribution, h: Vec3, alpha: Width) -> Scalar:
         anisotropic = ggx_d_anisotropic if distribution == "ggx" else beckmann_d_anisotropic
         return anisotropic(h, *alpha)
     return (ggx_d if distribution == "ggx" else beckmann_d)(h, alpha)
+
+
+def ggx_lambda(x: Any) -> Any:
+    """Lambda of the GGX distribution, of the square of alpha tan(theta) (Heitz 2014, eq. 72)."""
+    return 0.5 * x / (1.0 + jnp.sqrt(1.0 + x))
 
 
 @chunk

@@ -1,9 +1,6 @@
 """A thin film on a boundary: temper colours, anodised titanium, a coating against reflections."""
 
-from dataclasses import replace
-from typing import Any, Self
-
-import jax.numpy as jnp
+from typing import Any
 
 from .._chunk import clip
 from .._fields import derived, layer, param
@@ -31,15 +28,10 @@ def _term(degree: int) -> Any:
     return derived(f"degree {degree}" if degree else first)
 
 
-def _channel() -> Any:
-    return derived("the channel, 0 to 2, of which the numbers are; absent where they are colours")
-
-
 @layer
 class Baked:
     """What a film comes to once a material is prepared: `optics.film.bake`."""
 
-    film_channel: Number = _channel()
     film_0: Number = _term(0)
     film_1: Number = _term(1)
     film_2: Number = _term(2)
@@ -102,18 +94,13 @@ class Filmed(Baked, Facet):
             return f'the reflectance of a film is exact: leave fresnel = "{self.fresnel}" out, or the film'
         return None
 
-    def in_channels(self) -> Self:
-        """The same for a map over colour channels: a film, unlike all else, has to know which one it is seen in."""
-        made: Any = self
-        return made if self.film_nm is None else replace(made, film_channel=jnp.arange(3.0))
-
     def bake_film(self, above: Colour, eta: Colour, k: Colour | float) -> dict[str, Any]:
         """Fields of the film below a medium of index `above`, on one of the relative index eta + i k: baked ones for those given."""
         if problem := self.film_problem:
             raise InputError(f"{self.name}: {problem}")
-        terms = bake(self.film_eta / above, eta, k, self.film_nm * above, self.film_channel)
+        terms = bake(self.film_eta / above, eta, k, self.film_nm * above)
         baked = {f"film_{degree}": term for degree, term in enumerate(terms)}
-        return {"film_nm": None, "film_eta": None, "film_channel": None, **baked}
+        return {"film_nm": None, "film_eta": None, **baked}
 
     @property
     def has_film(self) -> bool:
