@@ -1,5 +1,6 @@
 """What every test shares: double precision, shape checks, the GL context, and the folders of data outside the repository."""
 
+import ctypes
 import gc
 import importlib.util
 import os
@@ -30,27 +31,20 @@ if importlib.util.find_spec("beartype"):
     source_info_util.register_exclusion(os.path.dirname(jaxtyping.__file__))
 
 
-MORE_MEMORY = 1.5e9
-"""Bytes by which this process may grow before what JAX keeps compiled is thrown away: a whole run would keep 6 GB."""
-
-_most_memory = MORE_MEMORY
+MOST_MEMORY = 2.0e9
+"""Bytes in memory above which what JAX keeps compiled is thrown away: a whole run would keep 6 GB."""
 
 
 @pytest.fixture(autouse=True)
 def _memory() -> Iterator[None]:
     yield
-    global _most_memory
-    if _resident() > _most_memory:
+    table = Path("/proc/self/statm")
+    if table.exists() and int(table.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") > MOST_MEMORY:
         jax.clear_caches()
         gc.collect()
-        # Counted from what is left: the process does not give all of it back, and may not start over at each test.
-        _most_memory = _resident() + MORE_MEMORY
-
-
-def _resident() -> int:
-    """Bytes in memory, 0 where there is no /proc."""
-    table = Path("/proc/self/statm")
-    return int(table.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if table.exists() else 0
+        # glibc keeps what was freed; without this the process would stay above, and throw all away after each test.
+        if trim := getattr(ctypes.CDLL(None), "malloc_trim", None):
+            trim(0)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
