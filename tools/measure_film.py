@@ -111,7 +111,7 @@ def polynomial(film: float, eta: np.ndarray, k: np.ndarray, cosines: np.ndarray 
     """Reflectance (thicknesses, cosines, 3) as baked."""
 
     def of(d):
-        baked = Baked(None, *bake(film, jnp.asarray(eta), jnp.asarray(k), d))
+        baked = Baked(*bake(film, jnp.asarray(eta), jnp.asarray(k), d))
         return jax.vmap(lambda c: film_reflects(c, baked_f0(baked, c)))(jnp.asarray(cosines))
 
     return np.asarray(jax.jit(jax.vmap(of))(jnp.asarray(THICKNESSES_NM)))
