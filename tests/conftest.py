@@ -16,8 +16,8 @@ from jax.extend import source_info_util
 if TYPE_CHECKING:
     import moderngl
 
-# Tests compile much and compute little: this way of fusing costs a third of the time. The fit leaves it out too.
-os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} --xla_cpu_use_fusion_emitters=false"
+# Tests compile much and compute little. What computes much, the fit and the walk, is compiled as its users have it.
+os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false")
 
 REPOSITORY = Path(__file__).parents[1]
 

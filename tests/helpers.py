@@ -97,6 +97,7 @@ def brdf(stack: Stack, wi: Any, wo: Any) -> Any:
     return evaluate(stack.form, stack.prepare(), wi, wo)
 
 
+@jax.jit
 def brdf_rows(stack: Stack, wi: Any, wo: Any) -> Any:
     """BRDF (n, 3) of rows of directions."""
     prepared = stack.prepare()

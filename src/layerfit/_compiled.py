@@ -35,7 +35,7 @@ class Compiled:
     def __init__(self, fn: Callable[..., Any], static: tuple[str, ...] = (), optimise: bool = True):
         """`optimise=False` for what takes longer to compile than it ever runs."""
         self._jit = jax.jit(fn, static_argnames=static)
-        self._options = OPTIONS if optimise else OPTIONS | {"xla_backend_optimization_level": 0}
+        self._options = OPTIONS | {"xla_backend_optimization_level": 3 if optimise else 0}
         self._executables: dict[Any, tuple[Future[Any], Any]] = {}
 
     def begin(self, *args: Any, **static: Any) -> Any:

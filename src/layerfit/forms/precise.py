@@ -249,6 +249,7 @@ def lobe(i: Crossing, o: Crossing, yi: Vec3, yo: Vec3, alpha: Scalar, masked: Sc
 
 @chunk
 def smith_lambda(w: Vec3, alpha: Scalar) -> Scalar:
-    """Lambda of the GGX distribution."""
+    """Lambda of the GGX distribution (Heitz 2014, eq. 72)."""
     tan2 = (w[0] * w[0] + w[1] * w[1]) / (w[2] * w[2])
-    return ggx_lambda(alpha * alpha * tan2)
+    x = alpha * alpha * tan2
+    return ggx_lambda(x)

@@ -4,6 +4,7 @@ import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import jax
@@ -88,7 +89,8 @@ def walk_rows(
     return Estimate(mean, np.sqrt(np.maximum(square - mean * mean, 0.0) / (count - 1)))
 
 
-@jax.jit
+# Compiled for speed whatever the process is set to: its loop is long, its text short.
+@partial(jax.jit, compiler_options={"xla_backend_optimization_level": 3, "xla_cpu_use_fusion_emitters": True})
 def _run(material: Material, wi: jax.Array, wo: jax.Array, lane: jax.Array, seed: jax.Array, paths: jax.Array) -> Tally:
     """Walk `paths` paths in every lane. Leaves (lanes,), directions (lanes, 3)."""
     light, eye = ((w[:, 0], w[:, 1], w[:, 2]) for w in (wi, wo))
