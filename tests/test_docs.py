@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import gallery
 import manual
 import pytest
 import typer.main
@@ -27,7 +28,10 @@ from layerfit.cli import app
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
+from layerfit.layers import LAYERS
 from layerfit.preset import read_preset
+from layerfit.shipped import shipped_presets
+from layerfit.surfaces import BASES
 
 REPOSITORY = Path(__file__).parents[1]
 PAGES = [
@@ -73,6 +77,26 @@ def test_tables_are_those_of_the_source(page):
 @pytest.mark.parametrize("table", manual.TABLES)
 def test_every_table_is_in_the_manual(table):
     assert any(f"<!-- table: {table} -->" in page.read_text() for page in (REPOSITORY / "docs").glob("*.md"))
+
+
+def test_every_model_has_a_picture():
+    """That of a preset that has it, or of a material that is drawn because no preset has it."""
+    kinds = {preset.name: _kinds(json.loads(preset.path.read_text())) for preset in shipped_presets()}
+    assert set(manual.SHOWN) == set.union(*kinds.values())
+    assert {*manual.SHOWN, *manual.EXAMPLES} == {*LAYERS, *BASES}
+    for kind, preset in manual.SHOWN.items():
+        assert kind in kinds[preset], kind
+
+
+def _kinds(preset: Any) -> set[str]:
+    return {part["type"] for part in (*preset["layers"], preset["base"])}
+
+
+@pytest.mark.parametrize("kind", manual.EXAMPLES)
+def test_the_picture_of_a_model_is_drawn_by_its_shader(kind):
+    shader = (REPOSITORY / "tests" / "golden" / f"{kind}.frag").read_text()
+    picture = REPOSITORY / "docs" / "images" / f"{kind}.png"
+    assert gallery.drawn_by(picture) == gallery.stamp(shader), "run python tools/manual.py --draw"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)

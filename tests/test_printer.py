@@ -6,19 +6,24 @@ from pathlib import Path
 
 import jax
 import jax.numpy as jnp
+import manual
 import numpy as np
 import pytest
 
 from helpers import STACKS
 from layerfit._chunk import CHUNKS, chunk, dot, member, safe_divide, safe_power, safe_sqrt, struct
 from layerfit._types import Scalar, Vec3
+from layerfit.layers import LAYERS
 from layerfit.optics.hashing import hash_cell, unit
+from layerfit.preset import MODELS, read_preset
 from layerfit.shader.export import HEADERS, print_material
 from layerfit.shader.gl import shade_points
 from layerfit.shader.glsl import PrintError, literal
 from layerfit.shader.primitives import BUILTINS, PRIMITIVES as PRINTED
 from layerfit.shader.printer import Printer
 from layerfit.shader.verify import random_pairs
+from layerfit.shipped import shipped_presets
+from layerfit.surfaces import BASES
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -230,18 +235,27 @@ def test_uniforms_and_constants_draw_the_same(gl, name):
     np.testing.assert_allclose(uniforms, constants, rtol=2e-5, atol=1e-6)
 
 
-GOLDEN_STACKS = ("corrected over conductor", "corrected over lambert", "corrected, three layers", "faithful over conductor")
+FORMS = ("corrected over conductor", "corrected over lambert", "corrected, three layers", "faithful over conductor")
+GOLDEN_STACKS = {name: STACKS[name] for name in FORMS} | manual.EXAMPLES
+"""What no preset shows: the shaders of those lie beside them."""
 
 
 @pytest.mark.parametrize("name", GOLDEN_STACKS)
 def test_golden(name, request):
     """The printed text, whole: a change of it is a change of every shipped shader and is looked at. --update-golden rewrites."""
     path = GOLDEN / (re.sub(r"\W+", "_", name) + ".frag")
-    text = print_material(STACKS[name], name).text()
+    text = print_material(GOLDEN_STACKS[name], name).text()
     if request.config.getoption("--update-golden"):
         path.parent.mkdir(exist_ok=True)
         path.write_text(text)
     assert text == path.read_text()
+
+
+def test_every_model_has_a_printed_shader_that_is_kept():
+    kept = [*GOLDEN_STACKS.values(), *(read_preset(preset.path) for preset in shipped_presets())]
+    shown = {type(part) for stack in kept for part in (*stack.layers, stack.base, stack.form)}
+    assert shown >= {*LAYERS.values(), *BASES.values(), *MODELS.values()}
+    assert {re.sub(r"\W+", "_", name) + ".frag" for name in GOLDEN_STACKS} == {path.name for path in GOLDEN.iterdir()}
 
 
 def test_the_text_reads_as_written_by_hand():

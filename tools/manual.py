@@ -2,38 +2,92 @@
 
     python tools/manual.py          rewrites the marked blocks of docs/
     python tools/manual.py --check  says which are out of date, exit code 1 where one is
+    python tools/manual.py --draw   draws the models that no preset shows, where what is printed for them has changed
 
-A block stands between `<!-- table: NAME -->` and `<!-- end -->`.
+A block stands between `<!-- table: NAME -->` and `<!-- end -->`. Above the table of a layer is a picture: that of a preset, or one drawn here.
 """
 
 import dataclasses
+import json
 import re
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import gallery
+
+import layerfit as lf
 from layerfit._fields import Param, params
 from layerfit.capture.scene import FitRequest
 from layerfit.layers import LAYERS
-from layerfit.preset import MODELS
+from layerfit.preset import MODELS, preset_of
 from layerfit.surfaces import BASES
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"^(<!-- table: (\w+) -->\n).*?^(<!-- end -->)$", re.MULTILINE | re.DOTALL)
 
+SHOWN = {
+    "coat": "lacquered_copper",
+    "patina": "patinated_copper",
+    "deposit": "polished_weathered_brass",
+    "overgrowth": "rusted_iron",
+    "polish": "polished_weathered_brass",
+    "conductor": "brushed_steel",
+    "lambert": "clear_coated_red_paint",
+    "oren_nayar": "dry_sandstone",
+    "car_paint": "car_paint_polaris_silver",
+    "flakes": "candy_apple_red",
+    "kubelka_munk": "cerulean_blue_enamel",
+}
+"""A preset of each model."""
+
+COPPER: dict[str, Any] = {"eta": [0.201, 0.924, 1.102], "k": [3.913, 2.453, 2.142]}
+WOOD = [0.5, 0.28, 0.13]
+RUST = lf.read_preset("rusted_iron")
+EXAMPLES = {
+    "dielectric": lf.Stack((), lf.Dielectric(alpha=0.1, eta=1.5)),
+    "phong": lf.Stack((), lf.Phong(kd=WOOD, ks=0.1, exponent=80.0)),
+    "blinn": lf.Stack((), lf.Blinn(kd=WOOD, ks=0.1, exponent=300.0)),
+    "lafortune": lf.Stack((), lf.Lafortune(kd=WOOD, ks=0.6, cx=-1.0, cz=0.97, exponent=30.0)),
+    "torrance_sparrow": lf.Stack((), lf.TorranceSparrow(ks=12.0, kappa=7.0, kd=[0.05, 0.02, 0.01], **COPPER)),
+    "cook_torrance": lf.Stack((), lf.CookTorrance(alpha=0.25, ks=0.9, kd=[0.05, 0.02, 0.01], **COPPER)),
+    "erosion": dataclasses.replace(RUST, layers=(lf.Erosion(amount_um=15.0), *RUST.layers)),
+}
+"""A material of each model that no preset shows. Their printed shaders lie in tests/golden, their pictures in docs/images."""
+
 STEPS = {"linear": "value", "log": "log(value)", "softlog": "log(1 + value / {soft:g})"}
 
 
-def layer(cls: type) -> str:
-    """The parameters of a layer, then what it can choose."""
+def layer(kind: str, cls: type) -> str:
+    """A picture, the parameters of a layer, then what it can choose."""
     rows = [("`name`", "text", "", f"`{_field(cls, 'name').default}`", "", _field(cls, "name").metadata["doc"])]
     rows += [_parameter(name, spec) for name, spec in params(cls)]
     for field in dataclasses.fields(cls):
         if choices := field.metadata.get("choices"):
             words = ", ".join(f"`{choice}`" for choice in choices)
             rows.append((f"`{field.name}`", words, "", f"`{choices[0]}`", "", field.metadata["doc"]))
-    return table(("key", "range", "unit", "default", "the fit steps in", "meaning"), rows)
+    return f"{_picture(kind)}\n\n{table(('key', 'range', 'unit', 'default', 'the fit steps in', 'meaning'), rows)}"
+
+
+def _picture(kind: str) -> str:
+    """A sphere of a model, and what it is of: a preset, or the layer as a preset has it."""
+    if preset := SHOWN.get(kind):
+        beside = f"../shaders/presets/{preset}"
+        return f"![{preset}]({beside}.png) [{preset}]({beside}.json)"
+    document = preset_of(EXAMPLES[kind], kind)
+    words = next(part for part in (*document["layers"], document["base"]) if part["type"] == kind)
+    return f"![{kind}](images/{kind}.png) `{json.dumps({key: value for key, value in words.items() if key != 'name'})}`"
+
+
+def draw() -> None:
+    """Draw the examples that are printed otherwise than when they were drawn."""
+    for kind, stack in EXAMPLES.items():
+        shader, path = lf.print_material(stack, kind), DOCS / "images" / f"{kind}.png"
+        mark = gallery.stamp(shader.text(gallery.TARGET))
+        if gallery.drawn_by(path) != mark:
+            path.write_bytes(gallery.picture(shader, mark))
+            print(f"drew {path}")
 
 
 def _field(cls: Any, name: str) -> Any:
@@ -70,7 +124,7 @@ def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 
 TABLES: dict[str, Callable[[], str]] = {
-    **{name: lambda cls=cls: layer(cls) for name, cls in (LAYERS | BASES).items()},
+    **{name: lambda name=name, cls=cls: layer(name, cls) for name, cls in (LAYERS | BASES).items()},
     **{name: lambda cls=cls: options(cls) for name, cls in MODELS.items()},
     "fit": lambda: options(FitRequest),
 }
@@ -88,6 +142,8 @@ def updated(text: str) -> str:
 
 
 def main() -> None:
+    if "--draw" in sys.argv:
+        draw()
     stale = [page for page in sorted(DOCS.glob("*.md")) if updated(page.read_text()) != page.read_text()]
     if "--check" in sys.argv:
         sys.exit("".join(f"{page}: tables are out of date; run python tools/manual.py\n" for page in stale) or 0)
