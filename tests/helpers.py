@@ -184,6 +184,12 @@ STACKS: dict[str, Stack] = {
     "precise, clear coat": Stack((varnish(tau=None),), Conductor(alpha=0.2, **COPPER), Precise()),
     "precise over lambert": Stack((varnish(),), Lambert(albedo=[0.5, 0.28, 0.13]), Precise()),
     "precise over oren_nayar": Stack((varnish(alpha=0.3),), OrenNayar(albedo=[0.5, 0.28, 0.13]), Precise("multi")),
+    "precise, anisotropic": Stack(
+        (varnish(alpha=None, alpha_x=0.05, alpha_y=0.2),), Conductor(alpha=None, alpha_x=0.3, alpha_y=0.1, **COPPER), Precise()
+    ),
+    "precise over an anisotropic metal": Stack(
+        (varnish(tau=None),), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.35, **COPPER), Precise("multi")
+    ),
     "faithful over conductor": Stack((varnish(masking="vcavity"),), Conductor(alpha=0.2, **COPPER), Faithful()),
     "faithful at the normal": Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Faithful("n", "n")),
     "faithful over lambert": Stack((varnish(),), Lambert(albedo=[0.5, 0.28, 0.13]), Faithful()),

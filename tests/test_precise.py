@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from helpers import COPPER, STACKS, brdf_rows, hemisphere
+from helpers import COPPER, STACKS, brdf_rows, hemisphere, varnish
 from layerfit.errors import InputError
-from layerfit.forms import curves, precise, tables
+from layerfit.forms import corrected, curves, precise, tables
 from layerfit.forms.precise import Crossing, Precise, Prepared, refuses
 from layerfit.layers import Coat
 from layerfit.optics.interface import facet_cosine, facet_tilt, rough_transmittance, second_facet
@@ -18,6 +18,7 @@ from layerfit.optics.microfacet import half_cosine
 from layerfit.preset import preset_of, stack_of
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Dielectric, Lambert, OrenNayar
+from layerfit.walk import walk_rows
 
 PRECISE = [name for name in STACKS if name.startswith("precise")]
 
@@ -169,6 +170,71 @@ def test_it_is_near_to_the_walk(oracle, interface, kind, narrow, p50, p90):
     assert np.quantile(error, 0.9) <= p90
 
 
+def brushed(x, y):
+    return Stack(
+        (varnish(alpha=None, alpha_x=x, alpha_y=y),),
+        Conductor(alpha=None, alpha_x=2.0 * y, alpha_y=2.0 * x, **COPPER),
+        Precise(),
+    ).astype(np.float64)
+
+
+def test_axes_of_one_width_are_one_width():
+    wi, wo = hemisphere(256, 3), hemisphere(256, 4)
+    plain = Stack((varnish(),), Conductor(alpha=0.2, **COPPER), Precise()).astype(np.float64)
+    np.testing.assert_allclose(brdf_rows(brushed(0.1, 0.1), wi, wo), brdf_rows(plain, wi, wo), rtol=1e-9)
+
+
+def test_axes_are_alike():
+    wi, wo = hemisphere(256, 3), hemisphere(256, 4)
+    swapped = [w[:, [1, 0, 2]] for w in (wi, wo)]
+    np.testing.assert_allclose(brdf_rows(brushed(0.05, 0.2), *swapped), brdf_rows(brushed(0.2, 0.05), wi, wo), rtol=1e-9)
+
+
+@functools.cache
+def walked_axes():
+    """Materials whose widths differ by axis, directions about the mirror's, and light from below the coat by the walk."""
+    rng = np.random.default_rng(8)
+    count, views = 40, 6
+    wide = lambda low, high: np.exp(rng.uniform(np.log(low), np.log(high), count)).repeat(views)  # noqa: E731
+    number = lambda low, high: rng.uniform(low, high, count).repeat(views)  # noqa: E731
+    coat = Coat(
+        alpha=None,
+        alpha_x=wide(0.03, 0.4),
+        alpha_y=wide(0.03, 0.4),
+        eta=number(1.3, 1.9),
+        tau=number(0.0, 1.0),
+        masking="smith_separable",
+    )
+    base = Conductor(alpha=None, alpha_x=wide(0.08, 0.6), alpha_y=wide(0.08, 0.6), eta=number(0.2, 1.5), k=number(2.0, 5.0))
+    wi = hemisphere(count, 5).repeat(views, 0)
+    wo = wi * [-1.0, -1.0, 1.0] + 0.25 * rng.normal(size=wi.shape)
+    wo[:, 2] = np.maximum(np.abs(wo[:, 2]), 0.15)
+    wo /= np.linalg.norm(wo, axis=-1, keepdims=True)
+    f = walk_rows(Stack((coat,), base), wi, wo, paths=4000, seed=1).mean.mean(-1)
+    return coat, base, wi, wo, f.reshape(count, views)
+
+
+def distance(form, options):
+    """Relative error of each of them."""
+    coat, base, wi, wo, f = walked_axes()
+
+    def one(coat, base, wi, wo):
+        prepared = form.prepare((coat,), base, options)
+        return form.evaluate(prepared, wi, wo, options) - coat.evaluate(wi, wo)
+
+    found = np.asarray(jax.jit(jax.vmap(one))(coat, base, wi, wo)).reshape(f.shape)
+    mu = wo[:, 2].reshape(f.shape)
+    return np.sum(np.abs(found - f) * mu, 1) / np.sum(f * mu, 1)
+
+
+def test_axes_are_near_to_the_walk():
+    error, plain = distance(precise, Precise()), distance(corrected, corrected.Corrected())
+    assert np.median(error) <= 0.06
+    assert np.quantile(error, 0.9) <= 0.15
+    for q in (0.5, 0.9):
+        assert np.quantile(error, q) < 0.6 * np.quantile(plain, q)
+
+
 @pytest.mark.parametrize("interface", ["single", "multi"])
 def test_the_baked_curves_are_the_tables(interface):
     """At the nodes of the tables, where the interpolation is exact, what is left is the error of the polynomials."""
@@ -239,8 +305,7 @@ def test_it_refuses_what_it_is_not_for():
     for layers, base in [
         ((), metal),
         ((coat, coat), metal),
-        ((Coat(alpha=None, alpha_x=0.1, alpha_y=0.2),), metal),
-        ((coat,), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.2, **COPPER)),
+        ((coat,), Conductor(alpha=0.2, distribution="beckmann", **COPPER)),
         ((coat,), Dielectric(alpha=0.2, eta=1.5)),
     ]:
         assert refuses(layers, base)
@@ -255,9 +320,9 @@ METAL = {"type": "conductor", "alpha": 0.2, "eta": [0.2, 0.9, 1.1], "k": [3.9, 2
 def test_it_is_the_default_where_the_structure_allows_it():
     assert stack_of({"layers": [{"type": "coat"}], "base": METAL}, "here").form == Precise("single")
     assert not isinstance(stack_of({"base": METAL}, "here").form, Precise)
-    assert not isinstance(
-        stack_of({"layers": [{"type": "coat", "alpha_x": 0.1, "alpha_y": 0.2}], "base": METAL}, "here").form, Precise
-    )
+    brushed = {"type": "coat", "alpha_x": 0.1, "alpha_y": 0.2}
+    assert stack_of({"layers": [brushed], "base": METAL}, "here").form == Precise("single")
+    assert not isinstance(stack_of({"layers": [brushed], "base": METAL | {"distribution": "beckmann"}}, "here").form, Precise)
 
 
 def test_its_interface_is_kept_in_a_preset_and_checked():

@@ -1,6 +1,6 @@
 #version 330 core
 // brushed_lacquered_brass: Coat over Conductor.
-// Printed by layerfit 0.1.0 from its corrected form.
+// Printed by layerfit 0.1.0 from its precise form.
 // Left out, because this material does without: lacquer: anisotropy.
 // Indices of refraction are relative to the layer above: its own index divides those in the preset.
 //
@@ -15,12 +15,18 @@ struct Coat {
 };
 
 struct Interface {
-    float n;            // index of the medium below, against air
-    float alpha;        // width of the facets, mean of the axes
-    float tilt;         // turn of the mean facet towards a grazing direction
-    float gain;         // part of the reflected light that a second facet lets in
-    float lengthening;  // path added by the spread of refracted directions, in thicknesses
-    float drift;        // scale of the path added at grazing angles
+    float tilt;        // turn of the mean facet towards a grazing direction
+    float gain;        // part of the reflected light that a second facet lets in
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec4 passed_high;  // the other four, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface
+    vec4 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it
+    vec4 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec4 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec4 theta_high;   // 
 };
 
 struct Conductor {
@@ -30,12 +36,24 @@ struct Conductor {
     vec3 k;         // index of refraction, imaginary part
 };
 
+struct Curve {
+    vec3 c0;  // coefficients of the powers of the curves' argument
+    vec3 c1;  // 
+    vec3 c2;  // 
+    vec3 c3;  // 
+    vec3 c4;  // 
+    vec3 c5;  // 
+    vec3 c6;  // 
+    vec3 c7;  // 
+};
+
 struct Crossing {
-    vec3 w;             // direction in the medium below
-    float T;            // energy that passes
-    float spread;       // width of the refracted directions over that of the facets
-    float lengthening;  // path beyond that of the refracted direction, in thicknesses
-    float drift;        // the part of it due to grazing incidence
+    vec3 w;       // median direction
+    float T;      // energy that passes
+    float a;      // spread, as a width
+    float path;   // mean path, in thicknesses
+    float theta;  // scale of the path's distribution
+    float s;      // argument of the baked curves
 };
 
 const Coat lf_lacquer = Coat(
@@ -45,12 +63,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    1.5,           // n: index of the medium below, against air
-    0.05,          // alpha: width of the facets, mean of the axes
-    0.010720346,   // tilt: turn of the mean facet towards a grazing direction
-    0.009790741,   // gain: part of the reflected light that a second facet lets in
-    0.0006401144,  // lengthening: path added by the spread of refracted directions, in thicknesses
-    0.18452969     // drift: scale of the path added at grazing angles
+    0.010720346,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.009790741,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.01052308, 0.023477288, -0.025500588, 0.028245652),    // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.011960212, -0.027178146, 0.027565999, -0.004649708),  // passed_high: the other four, of higher powers
+    vec4(1.0079943, -0.01767397, 0.016312718, -0.009322643),      // bend: sine of the refracted light over that at a smooth interface
+    vec4(0.035710335, -0.04656887, -0.0050554276, 0.019975185),   // bend_high: 
+    vec4(0.61749285, -0.2998138, -0.014232755, 0.032256246),      // spread: width of a lobe seen through it
+    vec4(0.64999557, -0.84071875, -0.21787071, 0.44369268),       // spread_high: 
+    vec4(1.0150344, -0.038873464, 0.035907388, -0.036181927),     // path: mean path over that of the refracted direction
+    vec4(0.12816024, -0.12173557, -0.06126547, 0.08013821),       // path_high: 
+    vec4(0.02877613, -0.08897024, 0.113705434, 0.018837735),      // theta: scale of the path's distribution
+    vec4(0.1763415, -0.5489767, -0.034426793, 0.36494577)         // theta_high: 
 );
 
 const Conductor lf_brass = Conductor(
@@ -59,6 +83,91 @@ const Conductor lf_brass = Conductor(
     vec3(0.32133332, 0.34866667, 0.7513333),  // eta: index of refraction, real part
     vec3(2.918, 1.778, 1.2086667)             // k: index of refraction, imaginary part
 );
+
+const Curve lf_lacquer_again = Curve(
+    vec3(0.14026329, 0.13573436, 0.12811393),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.014493076, -0.014055258, -0.014592107),   // c1: 
+    vec3(-0.0155369565, -0.015983753, -0.017167598),  // c2: 
+    vec3(-0.050804704, -0.05104193, -0.051575094),    // c3: 
+    vec3(-0.042326123, -0.03960514, -0.035563946),    // c4: 
+    vec3(0.059902728, 0.061503112, 0.06317955),       // c5: 
+    vec3(0.034854263, 0.03317964, 0.03112498),        // c6: 
+    vec3(-0.02425903, -0.025236368, -0.026064456)     // c7: 
+);
+
+const Curve lf_lacquer_rest = Curve(
+    vec3(0.81476265, 0.69875133, 0.43751994),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.090359345, -0.0797355, -0.05853664),      // c1: 
+    vec3(-0.10216415, -0.094714224, -0.06996873),     // c2: 
+    vec3(-0.059845686, -0.059993863, -0.045385838),   // c3: 
+    vec3(0.011950493, 0.016742349, 0.016967058),      // c4: 
+    vec3(-0.0440588, -0.02707529, -0.012820005),      // c5: 
+    vec3(-0.00050091743, -0.002742052, -0.00224787),  // c6: 
+    vec3(0.041252375, 0.031652927, 0.020431995)       // c7: 
+);
+
+// log(1 + x) without the cancellation near 0.
+float lf_log1p(float x) {
+    if (abs(x) > 0.3) {
+        return log(1.0 + x);
+    }
+    float s = x / (2.0 + x);
+    float u = s * s;
+    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+}
+
+vec3 lf_log1p(vec3 x) {
+    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
+}
+
+// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+float lf_grazing(float NoW) {
+    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+}
+
+// Cosine between a direction and the facets that it meets.
+float lf_facet_cosine(vec3 w, float tilt) {
+    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
+float lf_transmittance_dielectric(float c, float eta) {
+    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float eta2 = eta * eta;
+    float perpendicular = c + g;
+    float parallel = eta2 * c + g;
+    float product = 2.0 * c * g;
+    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
+    return eta == 1.0 ? 1.0 : passed;
+}
+
+// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
+float lf_with_second_facet(float T, float gain) {
+    return T + (1.0 - T) * gain;
+}
+
+// A polynomial of eight coefficients at s.
+float lf_curve(vec4 low, vec4 high, float s) {
+    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+}
+
+// Follow one direction through the coat's rough top.
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w) {
+    float s = lf_grazing(w.z);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
+    T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
+    T = min(T, 1.0);
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
+    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    bend = min(bend, 0.9998 / max(sine, 1e-06));
+    sine = sine * bend;
+    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
+    float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+}
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
@@ -104,68 +213,46 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+// Part of a lobe's width, as a power, that is due to the base.
+float lf_base_share(Crossing i, Crossing o, vec2 alpha) {
+    vec2 base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.412));
+    vec2 t = base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
+    return 0.5 * (t.x + t.y);
 }
 
-// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
-float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
-    float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+// The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
+vec3 lf_lean(Crossing x, Crossing i, Crossing o, vec2 alpha) {
+    float own = pow(max(x.a, 1e-30), 1.412);
+    vec2 total = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.412)) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
+    vec2 turn = 0.7504 * own / total;
+    float y0 = x.w.x - turn.x * (i.w.x + o.w.x);
+    float y1 = x.w.y - turn.y * (i.w.y + o.w.y);
+    float sine = sqrt(max(y0 * y0 + y1 * y1, 0.0));
+    float held = min(1.0, 0.9998 / max(sine, 1e-06));
+    sine = min(sine, 0.9998);
+    return vec3(y0 * held, y1 * held, sqrt(max((1.0 - sine) * (1.0 + sine), 0.0)));
 }
 
-// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
-float lf_with_second_facet(float T, float gain) {
-    return T + (1.0 - T) * gain;
+// Part of the path's spread that counts, by the base's share of the width.
+float lf_direct(float share, float d, float c, float e) {
+    return min(max(d + c * pow(max(share, 1e-30), e), 0.0), 1.5);
 }
 
-// Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+// Mean path of light that the base sends on: between that of one direction and that of all that cross.
+float lf_between(vec3 y, Crossing x, float part) {
+    float straight = 1.0 / y.z;
+    return straight + part * (x.path - straight);
 }
 
-// Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec3 lf_refract_about_normal(vec3 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
-    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
+vec3 lf_absorbed(float path, float theta, vec3 tau) {
+    float scale = max(theta, 1e-06);
+    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
 }
 
-// Width of the refracted directions over the width of the facets, to first order in slope.
-float lf_slope_spread(float c, float eta) {
-    float delta = (eta - 1.0) * (eta + 1.0);
-    float g = sqrt(max(delta + c * c, 0.0));
-    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
-}
-
-// Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
-    float c = lf_facet_cosine(w, interface_.tilt);
-    float c_energy = coat.eta >= 1.0 ? c : w.z;
-    float T = lf_with_second_facet(lf_transmittance_dielectric(c_energy, coat.eta), interface_.gain);
-    float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    vec3 below = lf_refract_about_normal(air, interface_.n);
-    return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
-}
-
-// Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
-vec3 lf_transmittance(vec3 tau, float path) {
-    return exp(-(tau * path));
-}
-
-// Turn a direction, azimuth kept, until its path 1 / w.z is longer by `lengthening`.
-vec3 lf_steer(vec3 w, float lengthening) {
-    float z = w.z / max(1.0 + lengthening * w.z, 1e-14);
-    float sine2 = w.x * w.x + w.y * w.y;
-    float growth = lengthening * z * w.z * (w.z + z) / max(sine2, 1e-14);
-    float ratio = sqrt(max(1.0 + growth, 0.0));
-    return vec3(w.x * ratio, w.y * ratio, z);
+// Mean of u among the paths that are left: sum of u exp(-tau u) over that of exp(-tau u).
+vec3 lf_projected(float path, float theta, vec3 tau) {
+    return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -186,25 +273,58 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     return 0.5 * (rs + rp);
 }
 
-// Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
-float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
-    float m = 0.5 * (1.0 - sine) / max(n * cosine, 1e-14);
-    return n > 1.0 ? 0.5 - 0.5 * m / max(sqrt(max(alpha * alpha + m * m, 0.0)), 1e-14) : 0.0;
+// 0 where the indices match and there is no interface, 1 from the first index of the tables on.
+float lf_presence(float eta) {
+    float t = max((eta - 1.0) / 0.15, 0.0);
+    t = min(t, 1.0);
+    return t * (2.0 - t);
 }
 
-// Anisotropic GGX density of facet normals (Burley 2012, eq. 13).
-float lf_ggx_d_anisotropic(vec3 h, float alpha_x, float alpha_y) {
-    float x = h.x / alpha_x;
-    float y = h.y / alpha_y;
-    float e = x * x + y * y + h.z * h.z;
-    return 1.0 / (3.1415927 * alpha_x * alpha_y * e * e);
+// Lambda of the GGX distribution (Heitz 2014, eq. 72).
+float lf_smith_lambda(vec3 w, vec2 alpha) {
+    float x = alpha.x * w.x;
+    float y = alpha.y * w.y;
+    float t = (x * x + y * y) / (w.z * w.z);
+    return 0.5 * t / (1.0 + sqrt(1.0 + t));
 }
 
-// NoW (1 + 2 Lambda) of the anisotropic GGX distribution (Heitz 2014, eqs. 72 and 80).
-float lf_ggx_projection_anisotropic(vec3 w, float alpha_x, float alpha_y) {
-    float x = alpha_x * w.x;
-    float y = alpha_y * w.y;
-    return sqrt(max(w.z * w.z + x * x + y * y, 0.0));
+// D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
+float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, vec2 alpha, vec2 masked) {
+    float M = yi.z + yo.z;
+    float M2 = M * M;
+    float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
+    vec2 width2 = pow(max(pow(max(alpha * M, 1e-30), vec2(1.412)) + spread, 1e-30), vec2(1.4164306));
+    vec2 own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
+    float size = sqrt(max(width2.x * width2.y, 0.0));
+    float r = max(1.0 + 0.3271 * (size / sqrt(max(own2.x * own2.y, 0.0)) - 1.0), 0.6);
+    r = min(r, 4.0);
+    float log_r = log(r);
+    float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
+    float X0 = i.w.x + o.w.x;
+    float X1 = i.w.y + o.w.y;
+    float v = X0 * X0 / width2.x + X1 * X1 / width2.y;
+    float Y0 = yi.x + yo.x;
+    float Y1 = yi.y + yo.y;
+    float tilt = 1.0 + (Y0 * Y0 + Y1 * Y1) / M2;
+    float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
+    return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * size * (1.0 + v * (b + r * v)));
+}
+
+// The polynomial at s; an energy is never below 0.
+vec3 lf_amount(Curve curve, float s) {
+    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
+    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+vec2 lf_wider(vec2 alpha, float coat_alpha) {
+    return pow(max(2.0 * pow(max(alpha, 1e-30), vec2(1.412)) + 0.5751 * pow(max(coat_alpha, 1e-30), 1.412), 1e-30), vec2(0.7082153));
+}
+
+// What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
+float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
+    float back = eta * eta * (i.w.x * o.w.x + i.w.y * o.w.y);
+    return max(1.0 - (1.0 - min(alpha, 1.0)) * back, 0.0) / 3.1415927;
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
@@ -212,69 +332,36 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     bool lit = wi.z > 0.0 && wo.z > 0.0;
     wi = lit ? wi : vec3(0.0, 0.0, 1.0);
     wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    Crossing crossing = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wi);
+    Crossing crossing2 = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_lacquer.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_lacquer.alpha);
     float projection_i = lf_ggx_projection(wi, lf_lacquer.alpha);
     float projection_o = lf_ggx_projection(wo, lf_lacquer.alpha);
     float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    float f = F * D * V;
-    Crossing i = lf_cross(lf_lacquer_interface, lf_lacquer, wi, wi);
-    Crossing o = lf_cross(lf_lacquer_interface, lf_lacquer, wo, wo);
-    float throughput = i.T * o.T / (lf_lacquer.eta * lf_lacquer.eta);
-    float straight = 1.0 / max(i.w.z, 1e-14) + 1.0 / max(o.w.z, 1e-14);
-    float added = i.lengthening + o.lengthening;
-    float sin_i = sqrt(max(wi.x * wi.x + wi.y * wi.y, 0.0));
-    float sin_o = sqrt(max(wo.x * wo.x + wo.y * wo.y, 0.0));
-    float R_i = 1.0 - i.T;
-    float R_o = 1.0 - o.T;
-    vec3 directional = lf_transmittance(lf_lacquer.tau, straight + 0.5 * added);
-    wi = lf_steer(i.w, 0.5 * i.drift);
-    wo = lf_steer(o.w, 0.5 * o.drift);
-    vec3 h = lf_half_vector(wi, wo);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_brass.eta, lf_brass.k);
-    float R = 0.5 * (R_i + R_o);
-    float alpha = sqrt(max(lf_brass.alpha_x * lf_brass.alpha_y, 0.0));
-    float edge_i = lf_edge_reflection(sin_i, i.w.z, lf_lacquer_interface.n, alpha);
-    float edge_o = lf_edge_reflection(sin_o, o.w.z, lf_lacquer_interface.n, alpha);
-    vec3 q = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
-    float spread = (pow(max(i.spread, 1e-30), 1.34) + pow(max(o.spread, 1e-30), 1.34)) * pow(max(lf_lacquer.alpha, 1e-30), 1.34);
-    float spread2 = (pow(max(i.spread, 1e-30), 1.34) + pow(max(o.spread, 1e-30), 1.34)) * pow(max(lf_lacquer.alpha, 1e-30), 1.34);
-    float total = spread + 3.0 * pow(max(lf_brass.alpha_x, 1e-30), 1.34);
-    total = total + 2.0 * pow(max(lf_lacquer.alpha, 1e-30), 1.34);
-    float width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
-    total = spread2 + 3.0 * pow(max(lf_brass.alpha_y, 1e-30), 1.34);
-    total = total + 2.0 * pow(max(lf_lacquer.alpha, 1e-30), 1.34);
-    float width2 = min(pow(max(total, 1e-30), 0.74626863), 1.5);
-    D = lf_ggx_d_anisotropic(h, width, width2);
-    projection_i = lf_ggx_projection_anisotropic(wi, width, width2);
-    projection_o = lf_ggx_projection_anisotropic(wo, width, width2);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    float lobe = D * V;
-    vec3 lobes = lobe / max(1.0 - q, 1e-06);
-    total = spread + 2.0 * pow(max(lf_brass.alpha_x, 1e-30), 1.34);
-    total = total + pow(max(lf_lacquer.alpha, 1e-30), 1.34);
-    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
-    total = spread2 + 2.0 * pow(max(lf_brass.alpha_y, 1e-30), 1.34);
-    total = total + pow(max(lf_lacquer.alpha, 1e-30), 1.34);
-    width2 = min(pow(max(total, 1e-30), 0.74626863), 1.5);
-    D = lf_ggx_d_anisotropic(h, width, width2);
-    projection_i = lf_ggx_projection_anisotropic(wi, width, width2);
-    projection_o = lf_ggx_projection_anisotropic(wo, width, width2);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    lobe = D * V;
-    lobes = lobe + q * lobes;
-    total = spread + pow(max(lf_brass.alpha_x, 1e-30), 1.34);
-    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
-    total = spread2 + pow(max(lf_brass.alpha_y, 1e-30), 1.34);
-    width2 = min(pow(max(total, 1e-30), 0.74626863), 1.5);
-    D = lf_ggx_d_anisotropic(h, width, width2);
-    projection_i = lf_ggx_projection_anisotropic(wi, width, width2);
-    projection_o = lf_ggx_projection_anisotropic(wo, width, width2);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    lobe = D * V;
-    lobes = lobe + q * lobes;
-    vec3 f2 = f + throughput * directional * F2 * lobes;
-    return lit ? f2 : vec3(0.0);
+    float throughput = crossing.T * crossing2.T / (lf_lacquer.eta * lf_lacquer.eta);
+    vec2 own = vec2(lf_brass.alpha_x, lf_brass.alpha_y);
+    float share = lf_base_share(crossing, crossing2, own);
+    vec3 yi = lf_lean(crossing, crossing, crossing2, own);
+    vec3 yo = lf_lean(crossing2, crossing, crossing2, own);
+    float part = lf_direct(share, 0.3296, 0.3522, 1.803);
+    vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_lacquer.tau);
+    part = lf_direct(share, 0.3096, 0.2662, 1.772);
+    float path = lf_between(yi, crossing, part);
+    vec3 U = lf_projected(path, part * crossing.theta, lf_lacquer.tau);
+    part = lf_direct(share, 0.3296, 0.3522, 1.803);
+    A = A * lf_absorbed(lf_between(yo, crossing2, part), part * crossing2.theta, lf_lacquer.tau);
+    part = lf_direct(share, 0.3096, 0.2662, 1.772);
+    path = lf_between(yo, crossing2, part);
+    U = U * lf_projected(path, part * crossing2.theta, lf_lacquer.tau);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(yi, yo), lf_brass.eta, lf_brass.k);
+    float rise = 1.0 + 0.3036 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * share;
+    float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, own, own);
+    vec3 again = 0.5 * F2 * (lf_amount(lf_lacquer_again, crossing.s) + lf_amount(lf_lacquer_again, crossing2.s));
+    vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(own, lf_lacquer.alpha), own);
+    vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, sqrt(max(0.5 * (lf_brass.alpha_x * lf_brass.alpha_x + lf_brass.alpha_y * lf_brass.alpha_y), 0.0)));
+    return lit ? F * D * V + throughput * A * (F2 * U * lobes2 + rest) : vec3(0.0);
 }
 
 // BRDF [1/sr] in any frame; t is a tangent, along which alpha_x is measured.

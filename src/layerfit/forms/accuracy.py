@@ -17,11 +17,15 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("precise", "single", "narrow"): (0.025, 0.078),
     ("precise", "single", "beckmann, diffuse"): (0.007, 0.033),
     ("precise", "single", "beckmann, conductor"): (0.034, 0.114),
+    ("precise", "single", "anisotropic, diffuse"): (0.006, 0.029),
+    ("precise", "single", "anisotropic, conductor"): (0.034, 0.113),
     ("precise", "multi", "diffuse"): (0.003, 0.009),
     ("precise", "multi", "conductor"): (0.015, 0.040),
     ("precise", "multi", "narrow"): (0.019, 0.049),
+    ("precise", "multi", "anisotropic, diffuse"): (0.005, 0.021),
+    ("precise", "multi", "anisotropic, conductor"): (0.037, 0.104),
 }
-"""(form, interface, base, with the facets of the coat where they are not GGX): median and 90th percentile over materials."""
+"""(form, interface, base, with the facets of the coat where they are not GGX, and anisotropy): median and 90th percentile over materials."""
 
 
 def against_walk(layers: tuple[Any, ...], base: Any, form: Any) -> dict[str, Any] | None:
@@ -30,12 +34,17 @@ def against_walk(layers: tuple[Any, ...], base: Any, form: Any) -> dict[str, Any
         return None
     name = "precise" if isinstance(form, precise.Precise) else "corrected"
     interface = getattr(form, "interface", "single")
-    kind = "diffuse"
-    if isinstance(base, Conductor):
-        kind = "narrow" if base.alpha < NARROW and layers[0].distribution == "ggx" else "conductor"
-    if layers[0].distribution != "ggx":
-        kind = f"{layers[0].distribution}, {kind}"
+    kind = _kind(layers[0], base)
     if (name, interface, kind) not in MEASURED:
         return None
     p50, p90 = MEASURED[name, interface, kind]
     return {"of": "light from below the coat, against the random walk", "interface": interface, "p50": p50, "p90": p90}
+
+
+def _kind(coat: Any, base: Any) -> str:
+    kind = "conductor" if isinstance(base, Conductor) else "diffuse"
+    if any(isinstance(getattr(surface, "width", None), tuple) for surface in (coat, base)):
+        kind = f"anisotropic, {kind}"
+    elif kind == "conductor" and base.alpha < NARROW and coat.distribution == "ggx":
+        kind = "narrow"
+    return kind if coat.distribution == "ggx" else f"{coat.distribution}, {kind}"

@@ -6,7 +6,7 @@ functions of one cosine, as polynomials. Both steps are smooth in index and widt
 
 import dataclasses
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +18,7 @@ from .._chunk import chunk, clip, member, safe_divide, safe_sqrt, struct, where
 from .._types import Colour, Scalar, Vec4
 from ..optics.interface import facet_tilt, rough_transmittance, second_facet
 from . import tables
+from .tables import Kind
 
 DEGREE = 7
 """Of the baked polynomials: their error (rms 2e-3 of the values) is below that of the form."""
@@ -99,7 +100,7 @@ def presence(eta: Scalar) -> Scalar:
     return t * (2.0 - t)
 
 
-def bake(eta: Scalar, alpha: Scalar, kind: Literal["single", "multi"]) -> tuple[Interface, Nodes]:
+def bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     """Curves of one interface, and what they run through. Numbers stay numbers, also inside a trace: a shader has them as constants."""
     if isinstance(eta, Tracer) or isinstance(alpha, Tracer):
         return _bake(eta, alpha, kind)
@@ -108,7 +109,7 @@ def bake(eta: Scalar, alpha: Scalar, kind: Literal["single", "multi"]) -> tuple[
     return interface, jax.tree.map(np.asarray, nodes)
 
 
-def _bake(eta: Scalar, alpha: Scalar, kind: Literal["single", "multi"]) -> tuple[Interface, Nodes]:
+def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     baked = _baking(kind)
     dtype = eta.dtype
     at = jnp.einsum("e,a,eaq->q", _cubic(eta, baked.eta), _cubic(alpha, baked.alpha), jnp.asarray(baked.values, dtype))
@@ -188,7 +189,7 @@ class _Baking:
 
 
 @cache
-def _baking(kind: Literal["single", "multi"]) -> _Baking:
+def _baking(kind: Kind) -> _Baking:
     t = tables.load(kind)
     edge = np.sqrt(1.0 - 1.0 / t.eta[0].astype(float) ** 2)
     below = t.mu_below[0].astype(float)

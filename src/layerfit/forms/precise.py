@@ -1,16 +1,16 @@
-"""The precise form: the closed form nearest to the random walk, for one isotropic GGX coat over a diffuse or a metal base.
+"""The precise form: the closed form nearest to the random walk, for one coat over a diffuse or a metal base.
 
 What the coat's rough top does to light is not computed but read, from tables that the random walk made (`tables`): the energy that
 passes, the median direction of the refracted light, its spread, and the distribution of its path. Each is a function of one cosine;
 `prepare` looks the material up and bakes the functions as polynomials, so that evaluation, in JAX and in the shader, is closed form.
 The base then answers with a lobe for light that met it once; light that met it more often is summed by `bounces`. Reciprocal by
-construction: light that comes and light that leaves are treated alike.
+construction: light that comes and light that leaves are treated alike. Widths may differ by axis (`axes`).
 
 The constants below were fitted to the random walk, on grids of random materials.
 """
 
 import dataclasses
-from typing import Any, Literal
+from typing import Any
 
 import jax.numpy as jnp
 
@@ -18,15 +18,17 @@ from .._chunk import chunk, clip, member, safe_power, safe_sqrt, struct, where
 from .._types import Colour, Number, Scalar, Vec3
 from ..layers import Coat
 from ..optics.interface import facet_cosine, rough_transmittance
-from ..optics.microfacet import ggx_lambda, half_cosine
+from ..optics.microfacet import Width, ggx_lambda, half_cosine
 from ..surfaces.microfacet import Conductor
+from .axes import Widths, along, area, even_width, over_axes, stretched, tops, towards, widths
 from .bounces import Curve, amount, bounces, wider
-from .curves import Interface, P, absorbed, bake, curve, diffuse_return, grazing, presence
+from .curves import Interface, P, absorbed, curve, diffuse_return, grazing, presence
+from .tables import Kind
 
-BAKED = ("alpha", "eta")
+BAKED = ("alpha", "alpha_x", "alpha_y", "eta")
 """Fields of the coat that a shader holds as constants, through the curves that they give."""
 
-HELD = ("interface", "again", "rest")
+HELD = ("interface", "again", "rest", "across")
 """Parts of a prepared material that a shader holds as constants, also where its other numbers can be set."""
 
 CONDENSE = 0.7504
@@ -50,7 +52,7 @@ class Precise:
     `single`: light meets one facet, as in most renderers; a rough coat loses energy. `multi`: as many as it takes.
     """
 
-    interface: Literal["single", "multi"] = "single"
+    interface: Kind = "single"
 
 
 def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
@@ -58,8 +60,6 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
     if len(layers) != 1:
         return "it is for one coat" if layers else "there is no coat"
     coat = layers[0]
-    if coat.alpha is None:
-        return f"{coat.name} is not isotropic"
     if coat.fresnel != "exact":
         return f"{coat.name} has the reflectance of {coat.fresnel}, and the tables were made with the exact one"
     if coat.tau_s is not None:
@@ -70,8 +70,8 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
         return None
     if not isinstance(base, Conductor):
         return f"{base.name} is neither diffuse alone (lambert, oren_nayar, kubelka_munk) nor a conductor, the bases that it was made for"
-    if base.alpha is None or base.distribution != "ggx":
-        return f"{base.name} is not isotropic GGX"
+    if base.distribution != "ggx":
+        return f"{base.name} is not GGX"
     return None
 
 
@@ -88,6 +88,8 @@ class Prepared:
     """Of a metal: weight of the wider lobe of light that met it twice."""
     rest: Curve | None
     """Of a metal: fourth root of the light that is left."""
+    across: Interface | None = None
+    """Of an anisotropic coat: `interface` is for light along the tangent, this for light across it."""
 
 
 @struct
@@ -96,7 +98,7 @@ class Crossing:
 
     w: Vec3 = member("median direction")
     T: Scalar = member("energy that passes")
-    a: Scalar = member("spread, as a width")
+    a: Widths = member("spread, as a width")
     path: Scalar = member("mean path, in thicknesses")
     theta: Scalar = member("scale of the path's distribution")
     s: Scalar = member("argument of the baked curves")
@@ -105,17 +107,30 @@ class Crossing:
 def prepare(coats: tuple[Coat, ...], base: Any, options: Precise) -> Prepared:
     """Look up what the interface does and bake it, for a material that `refuses` has nothing against."""
     (coat,) = coats
-    interface, nodes = bake(coat.eta, crossed(coat), options.interface)
+    width = crossed(coat)
+    interface, across, nodes = tops(coat.eta, width, options.interface)
     coat = coat.below(jnp.ones_like(coat.eta))
     base = base.below(coat.eta)
     if isinstance(base, Conductor):
-        return Prepared(coat, interface, base, None, *bounces(nodes, crossed(coat), coat, base))
-    return Prepared(coat, interface, base, diffuse_return(nodes, coat.tau), None, None)
+        even_base = dataclasses.replace(base, alpha=even_width(base.width), alpha_x=None, alpha_y=None)
+        again, rest = bounces(nodes, even_width(width), coat, even_base)
+        return Prepared(coat, interface, base, None, again, rest, across)
+    return Prepared(coat, interface, base, diffuse_return(nodes, coat.tau), None, None, across)
 
 
-def crossed(coat: Coat) -> Scalar:
+def crossed(coat: Coat) -> Width:
     """Width of the GGX facets that light which crosses the coat meets."""
-    return coat.alpha if coat.distribution == "ggx" else BECKMANN * coat.alpha
+    if coat.distribution == "ggx":
+        return coat.width
+    if isinstance(coat.width, tuple):
+        return BECKMANN * coat.width[0], BECKMANN * coat.width[1]
+    return BECKMANN * coat.width
+
+
+def cross(prepared: Prepared, w: Vec3) -> Crossing:
+    """Follow one direction into the coat."""
+    interface = towards(prepared.interface, prepared.across, w)
+    return pass_interface(interface, prepared.coat.eta, widths(crossed(prepared.coat)), w)
 
 
 def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Precise) -> Colour:
@@ -125,7 +140,7 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Precise) -> Colour
     wi = where(lit, wi, up)
     wo = where(lit, wo, up)
     coat = prepared.coat
-    i, o = (pass_interface(prepared.interface, coat.eta, crossed(coat), w) for w in (wi, wo))
+    i, o = (cross(prepared, w) for w in (wi, wo))
     return where(lit, coat.evaluate(wi, wo) + below(i, o, prepared), 0.0)
 
 
@@ -137,8 +152,9 @@ def below(i: Crossing, o: Crossing, prepared: Prepared) -> Colour:
         A = 1.0 if coat.tau is None else absorbed(i.path, i.theta, coat.tau) * absorbed(o.path, o.theta, coat.tau)
         return throughput * A * base.evaluate(i.w, o.w) / jnp.maximum(1.0 - base.albedo * prepared.returned, 1e-6)
     alpha = crossed(coat)
-    share = base_share(i, o, base.alpha)
-    yi, yo = lean(i, i, o, base.alpha), lean(o, i, o, base.alpha)
+    top, own = widths(alpha), widths(base.width)
+    share = base_share(i, o, own)
+    yi, yo = lean(i, i, o, own), lean(o, i, o, own)
     A: Any = 1.0
     U: Any = 1.0
     for y, x in ((yi, i), (yo, o)):
@@ -150,14 +166,15 @@ def below(i: Crossing, o: Crossing, prepared: Prepared) -> Colour:
         U = U * (path if coat.tau is None else projected(path, part * x.theta, coat.tau))
     F = base.reflectance(half_cosine(yi, yo))
     # Where the indices match there is no interface, and nothing of what it does.
-    rise = 1.0 + RISE * presence(coat.eta) * alpha * alpha * share
-    lobes: Any = rise * lobe(i, o, yi, yo, base.alpha, base.alpha)
+    even = even_width(alpha)
+    rise = 1.0 + RISE * presence(coat.eta) * even * even * share
+    lobes: Any = rise * lobe(i, o, yi, yo, own, own)
     if prepared.again is None or prepared.rest is None:
         return throughput * F * A * U * lobes
     again = 0.5 * F * (amount(prepared.again, i.s) + amount(prepared.again, o.s))
-    lobes = lobes + again * lobe(i, o, yi, yo, wider(base.alpha, alpha), base.alpha)
+    lobes = lobes + again * lobe(i, o, yi, yo, wider(own, top), own)
     root = amount(prepared.rest, i.s) * amount(prepared.rest, o.s)
-    rest = root * root * ahead(i, o, coat.eta, base.alpha)
+    rest = root * root * ahead(i, o, coat.eta, even_width(base.width))
     return throughput * A * (F * U * lobes + rest)
 
 
@@ -169,7 +186,7 @@ def ahead(i: Crossing, o: Crossing, eta: Scalar, alpha: Scalar) -> Scalar:
 
 
 @chunk
-def pass_interface(interface: Interface, eta: Scalar, alpha: Scalar, w: Vec3) -> Crossing:
+def pass_interface(interface: Interface, eta: Scalar, alpha: Widths, w: Vec3) -> Crossing:
     """Follow one direction through the coat's rough top."""
     s = grazing(w[2])
     T = rough_transmittance(facet_cosine(w, interface.tilt), eta, interface.gain)
@@ -199,20 +216,20 @@ def between(y: Vec3, x: Crossing, part: Scalar) -> Scalar:
 
 
 @chunk
-def base_share(i: Crossing, o: Crossing, alpha: Scalar) -> Scalar:
+def base_share(i: Crossing, o: Crossing, alpha: Widths) -> Scalar:
     """Part of a lobe's width, as a power, that is due to the base."""
     base = safe_power(alpha * (i.w[2] + o.w[2]), P)
-    return base / (base + safe_power(i.a, P) + safe_power(o.a, P))
+    return over_axes(base / (base + safe_power(i.a, P) + safe_power(o.a, P)))
 
 
 @chunk
-def lean(x: Crossing, i: Crossing, o: Crossing, alpha: Scalar) -> Vec3:
+def lean(x: Crossing, i: Crossing, o: Crossing, alpha: Widths) -> Vec3:
     """The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone."""
     own = safe_power(x.a, P)
     total = safe_power(alpha * (i.w[2] + o.w[2]), P) + safe_power(i.a, P) + safe_power(o.a, P)
     turn = CONDENSE * own / total
-    y0 = x.w[0] - turn * (i.w[0] + o.w[0])
-    y1 = x.w[1] - turn * (i.w[1] + o.w[1])
+    y0 = x.w[0] - along(turn, 0) * (i.w[0] + o.w[0])
+    y1 = x.w[1] - along(turn, 1) * (i.w[1] + o.w[1])
     sine = safe_sqrt(y0 * y0 + y1 * y1)
     held = jnp.minimum(1.0, 0.9998 / jnp.maximum(sine, 1e-6))
     sine = jnp.minimum(sine, 0.9998)
@@ -226,7 +243,7 @@ def direct(share: Scalar, d: Number, c: Number, e: Number) -> Scalar:
 
 
 @chunk
-def lobe(i: Crossing, o: Crossing, yi: Vec3, yo: Vec3, alpha: Scalar, masked: Scalar) -> Scalar:
+def lobe(i: Crossing, o: Crossing, yi: Vec3, yo: Vec3, alpha: Widths, masked: Widths) -> Scalar:
     """D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
 
     Without an interface, and times the projected areas, it is D V of GGX.
@@ -236,20 +253,24 @@ def lobe(i: Crossing, o: Crossing, yi: Vec3, yo: Vec3, alpha: Scalar, masked: Sc
     spread = safe_power(i.a, P) + safe_power(o.a, P)
     width2 = safe_power(safe_power(alpha * M, P) + spread, 2.0 / P)
     own2 = alpha * alpha * M2 + TAIL * (i.a * i.a + o.a * o.a)
-    r = clip(1.0 + RATIO * (width2 / own2 - 1.0), 0.6, 4.0)
+    size = area(width2)
+    r = clip(1.0 + RATIO * (size / area(own2) - 1.0), 0.6, 4.0)
     log_r = jnp.log(r)
     b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r))
     X0, X1 = i.w[0] + o.w[0], i.w[1] + o.w[1]
-    v = (X0 * X0 + X1 * X1) / width2
+    v = stretched(X0, X1, width2)
     Y0, Y1 = yi[0] + yo[0], yi[1] + yo[1]
     tilt = 1.0 + (Y0 * Y0 + Y1 * Y1) / M2
     G = 1.0 / (1.0 + smith_lambda(yi, masked) + smith_lambda(yo, masked))
-    return M2 * tilt * tilt * (0.25 * G) / (jnp.pi * width2 * (1.0 + v * (b + r * v)))
+    return M2 * tilt * tilt * (0.25 * G) / (jnp.pi * size * (1.0 + v * (b + r * v)))
 
 
 @chunk
-def smith_lambda(w: Vec3, alpha: Scalar) -> Scalar:
+def smith_lambda(w: Vec3, alpha: Widths) -> Scalar:
     """Lambda of the GGX distribution (Heitz 2014, eq. 72)."""
+    if jnp.ndim(alpha):
+        x, y = alpha[0] * w[0], alpha[1] * w[1]
+        return ggx_lambda((x * x + y * y) / (w[2] * w[2]))
     tan2 = (w[0] * w[0] + w[1] * w[1]) / (w[2] * w[2])
     x = alpha * alpha * tan2
     return ggx_lambda(x)

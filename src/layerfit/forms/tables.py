@@ -12,6 +12,9 @@ import numpy as np
 
 FILE = Path(__file__).with_name("interface_tables.npz")
 
+Kind = Literal["single", "multi"]
+"""What light does at a rough boundary: it meets one facet, or as many as it takes to leave."""
+
 
 @dataclass(frozen=True, eq=False)
 class InterfaceTables:
@@ -57,7 +60,7 @@ class Origin:
 
 
 @cache
-def load(interface: Literal["single", "multi"]) -> InterfaceTables:
+def load(interface: Kind) -> InterfaceTables:
     """The tables of one model of the interface: scattered once, or as often as it takes."""
     with _open() as data:
         nodes = {name: _read_only(data[name]) for name in ("eta", "alpha", "mu", "mu_below")}

@@ -197,9 +197,11 @@ def _uniforms(stack: Stack) -> list[tuple[Any, str, str, str] | None]:
     for layer in (*stack.layers, stack.base):
         for field, spec in params(layer):
             value = getattr(layer, field)
+            if value is None:
+                continue
             if layer is baked and field in BAKED:
                 rows.append(None)
-            elif value is not None:
+            else:
                 note = f"{spec.doc}, {spec.lower:g} to {spec.upper:g} {'' if spec.unit == '1' else spec.unit}".rstrip()
                 rows.append((value, f"u_{layer.name}_{field}", "vec3" if value.ndim else "float", note))
     return rows
