@@ -47,7 +47,23 @@ def struct(cls: type[T]) -> type[T]:
     made: Any = dataclasses.dataclass(frozen=True, eq=False)(cls)
     fields = dataclasses.fields(made)
     meta = [f.name for f in fields if f.metadata.get("static")]
-    return jax.tree_util.register_dataclass(made, [f.name for f in fields if f.name not in meta], meta)
+    data = [f.name for f in fields if f.name not in meta]
+    keys = [jax.tree_util.GetAttrKey(name) for name in data]
+
+    def flatten(x: Any) -> tuple[list[Any], tuple[Any, ...]]:
+        return [getattr(x, name) for name in data], tuple(getattr(x, name) for name in meta)
+
+    def with_keys(x: Any) -> Any:
+        leaves, aux = flatten(x)
+        return list(zip(keys, leaves, strict=True)), aux
+
+    def unflatten(aux: tuple[Any, ...], leaves: Any) -> Any:
+        return made(**dict(zip(meta, aux, strict=True)), **dict(zip(data, leaves, strict=True)))
+
+    # Not `register_dataclass`: to it structures of two classes with fields alike are equal, and where their hashes happen to be so
+    # too, one class is given what was compiled for the other.
+    jax.tree_util.register_pytree_with_keys(made, with_keys, unflatten, flatten)
+    return made
 
 
 @jax.jit

@@ -32,10 +32,10 @@ _POOL = ThreadPoolExecutor(2, "compile")
 class Compiled:
     """A traced function with one executable for each structure and size of its arguments, made when it is first called."""
 
-    def __init__(self, fn: Callable[..., Any], static: tuple[str, ...] = (), optimise: bool = True):
-        """`optimise=False` for what takes longer to compile than it ever runs."""
+    def __init__(self, fn: Callable[..., Any], static: tuple[str, ...] = (), optimise: int = 3):
+        """`optimise`: 3 for what runs over pixels, 1 for what runs once a step, 0 for what runs once: it compiles sooner."""
         self._jit = jax.jit(fn, static_argnames=static)
-        self._options = OPTIONS | {"xla_backend_optimization_level": 3 if optimise else 0}
+        self._options = OPTIONS | {"xla_backend_optimization_level": optimise}
         self._executables: dict[Any, tuple[Future[Any], Any]] = {}
 
     def begin(self, *args: Any, **static: Any) -> Any:

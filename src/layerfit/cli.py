@@ -379,4 +379,6 @@ def demo(
     use_compilation_cache()
     from .demo import run
 
-    raise typer.Exit(0 if run(output, stderr) else 1)
+    with _progress() as report:
+        good = run(output, stderr, report)
+    raise typer.Exit(0 if good else 1)

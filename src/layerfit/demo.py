@@ -6,18 +6,18 @@ from typing import Any
 from ._data import references
 from .documents import check_directory
 from .fit.words import measured
-from .job import Outcome, fit_scene
+from .job import Outcome, Progress, fit_scene
 from .report.text import image_error, relative
 
 
-def run(directory: Path, console: Any) -> bool:
+def run(directory: Path, console: Any, progress: Progress) -> bool:
     """Fit all shipped references into `directory`, a folder each; prints a line each and where the pictures are."""
     check_directory(directory)
     scenes = sorted(references().glob("*.toml"))
     outcomes: list[tuple[str, Outcome]] = []
     for k, scene in enumerate(scenes):
         console.print(f"[{k + 1}/{len(scenes)}] {scene.stem}", markup=False)
-        outcome = fit_scene(scene, directory / scene.stem)
+        outcome = fit_scene(scene, directory / scene.stem, progress=progress)
         outcomes.append((scene.stem, outcome))
         for line in _summary(outcome.document):
             console.print(f"      {line}", markup=False, soft_wrap=True)

@@ -62,7 +62,7 @@ class Stack:
         return replace(self, layers=left, form=self.form if left else corrected.Corrected())
 
 
-prepared = Compiled(Stack.prepare, optimise=False)
+prepared = Compiled(Stack.prepare, optimise=0)
 """What is computed once per material, compiled."""
 
 

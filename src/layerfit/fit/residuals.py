@@ -55,9 +55,9 @@ def _advance(u: Any, state: Any, bounds: Any, total: Any, *, free: Parametrisati
     return u, state
 
 
-_derivatives = Compiled(_material, ("free",))
+_derivatives = Compiled(_material, ("free",), optimise=1)
 _block_columns = Compiled(_columns, ("form",))
-_solver_step = Compiled(_advance, ("free", "solver"))
+_solver_step = Compiled(_advance, ("free", "solver"), optimise=1)
 
 
 def begin(u: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation) -> None:

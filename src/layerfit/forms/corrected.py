@@ -8,33 +8,22 @@ back down makes a series of ever wider lobes. Holds for any number of coats; wit
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import reduce
 from operator import add
 from typing import Any
 
-import jax
 import jax.numpy as jnp
-import numpy as np
 
-from .._chunk import chunk, member, safe_divide, safe_power, safe_sqrt, struct, where
+from .._chunk import chunk, safe_divide, safe_power, safe_sqrt, struct, where
 from .._types import Colour, Scalar, Vec3
 from ..layers import Coat
-from ..optics.interface import (
-    drift,
-    drift_scale,
-    facet_cosine,
-    facet_tilt,
-    second_facet,
-    slope_spread,
-    spread_lengthening,
-    steer,
-    with_second_facet,
-)
-from ..optics.medium import refract_about_normal, transmittance
+from ..optics.interface import steer
 from ..optics.microfacet import Width, half_cosine, half_vector
 from ..surfaces.base import Lobe
 from . import haze
+from .crossing import Crossing, Interface, cross, interface_of, mean_width
+from .enclosure import haze_below, left, remains
 
 # Share of the path that a rough interface adds which light of a directional lobe takes: fitted, it lies between none and all.
 DIRECTIONAL_SHARE = 0.5
@@ -71,18 +60,6 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
 
 
 @struct
-class Interface:
-    """What a coat's rough top does to light that passes."""
-
-    n: Scalar = member("index of the medium below, against air")
-    alpha: Scalar = member("width of the facets, mean of the axes")
-    tilt: Scalar = member("turn of the mean facet towards a grazing direction")
-    gain: Scalar = member("part of the reflected light that a second facet lets in")
-    lengthening: Scalar = member("path added by the spread of refracted directions, in thicknesses")
-    drift: Scalar = member("scale of the path added at grazing angles")
-
-
-@struct
 class Prepared:
     """Coats with relative indices, what their interfaces do, and the base with what returns to it."""
 
@@ -99,28 +76,6 @@ class Prepared:
     """What the innermost coat does to light that it scatters."""
 
 
-def _mean_width(width: Width) -> Scalar:
-    return safe_sqrt(width[0] * width[1]) if isinstance(width, tuple) else width
-
-
-def _interface(coat: Coat, n: Scalar, options: Corrected) -> Interface:
-    """`coat` with its relative index; `n` its absolute one."""
-    alpha = jnp.minimum(_mean_width(coat.width), 1.0)
-    if not options.rough_interface:
-        alpha = jnp.zeros_like(alpha)
-    # Where light leaves a denser medium for the base the fits do not hold: the interface is smooth there.
-    enters = coat.eta >= 1.0
-    eta = jnp.maximum(coat.eta, 1.0)
-    return Interface(
-        n=n,
-        alpha=alpha,
-        tilt=facet_tilt(alpha),
-        gain=where(enters, second_facet(alpha), 0.0),
-        lengthening=spread_lengthening(eta, alpha),
-        drift=drift_scale(eta, alpha),
-    )
-
-
 def prepare(coats: tuple[Coat, ...], base: Any, options: Corrected) -> Prepared:
     """Relative indices, constants of the interfaces, and the light that returns to the base."""
     n = jnp.ones_like(coats[0].eta)
@@ -128,32 +83,19 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Corrected) -> Prepared:
     for coat in coats:
         relative.append(coat.below(n))
         n = coat.eta
-        interfaces.append(_interface(relative[-1], n, options))
+        interfaces.append(interface_of(relative[-1], n, options.rough_interface))
     base = base.below(n)
     returned = lobes = trapped = light = None
     if relative[-1].tau_s is not None and options.multiple:
-        light = _haze(relative, interfaces, base)
+        light = haze_below(relative, interfaces, base)
     elif base.diffuse is not None and base.lobes:
         one = jnp.ones_like(n)
         lobes = jnp.minimum(reduce(add, (lobe.energy(lobe.reflectance(one)) for lobe in base.lobes)), 1.0)
     if base.diffuse is not None and light is None:
-        returned = 1.0 / jnp.maximum(_left(base.diffuse.albedo, lobes, relative, interfaces), 1e-6)
+        returned = 1.0 / jnp.maximum(left(base.diffuse.albedo, lobes, relative, interfaces), 1e-6)
     if base.lobes and options.trapped:
         trapped = reduce(add, (trapped_light(lobe, relative[-1].extinction, n) for lobe in base.lobes))
     return Prepared(tuple(relative), tuple(interfaces), base, returned, lobes, trapped, light)
-
-
-def _left(albedo: Colour, lobes: Colour | None, coats: list[Coat], interfaces: list[Interface]) -> Colour:
-    """What is left of light between two meetings with the diffuse part, taken from 1: 1 - d 2 int R / (1 - s R) mu dmu.
-
-    d and s are the albedos of the diffuse part and of the lobes, R is what comes back. In between, light meets the lobes as it would
-    a mirror. Written by x = 1 - R, nothing cancels where d + s is near 1, which is also the most that it counts.
-    """
-    escape = _escape(coats, interfaces, lobes)
-    if lobes is None:
-        return 1.0 - albedo + albedo * escape
-    both = jnp.minimum(albedo + lobes, 1.0)
-    return (1.0 - both) / jnp.maximum(1.0 - lobes, 1e-6) * (1.0 - lobes * escape) + both * escape
 
 
 def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Corrected) -> Colour:
@@ -180,30 +122,6 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Corrected) -> Colo
     if prepared.coats[-1].tau_s is not None:
         f = f + below.throughput * _scattered(prepared, below, options)
     return where(lit, f, 0.0)
-
-
-@struct
-class Crossing:
-    """One direction on its way through one rough interface."""
-
-    w: Vec3 = member("direction in the medium below")
-    T: Colour = member("energy that passes")
-    spread: Scalar = member("width of the refracted directions over that of the facets")
-    lengthening: Scalar = member("path beyond that of the refracted direction, in thicknesses")
-    drift: Scalar = member("the part of it due to grazing incidence")
-
-
-@chunk
-def cross(interface: Interface, coat: Coat, w: Vec3, air: Vec3) -> Crossing:
-    """Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them."""
-    c = facet_cosine(w, interface.tilt)
-    # Out of a denser medium the fits do not hold for the energy: there the interface passes light as a smooth one.
-    c_energy = where(coat.eta >= 1.0, c, w[2])
-    T = with_second_facet(coat.transmittance(c_energy), interface.gain)
-    grazing = drift(w, interface.drift, interface.alpha)
-    # From air at once, not from layer to layer: going back to index 1 gives the same direction to the last bit.
-    below = refract_about_normal(air, interface.n)
-    return Crossing(below, T, slope_spread(c, coat.eta), interface.lengthening + grazing, grazing)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -259,21 +177,17 @@ def _enter(above: _Below | None, wi: Vec3, wo: Vec3, prepared: Prepared, options
         sin_i=sin_i,
         sin_o=sin_o,
         throughput=throughput,
-        directional=_absorbed(coat.extinction, straight + DIRECTIONAL_SHARE * added),
-        diffuse=_absorbed(coat.extinction, straight + added),
+        directional=remains(coat.extinction, straight + DIRECTIONAL_SHARE * added),
+        diffuse=remains(coat.extinction, straight + added),
         R_i=R_i,
         R_o=R_o,
         spreads=(*spreads, (coat.width, i.spread, o.spread)),
     )
 
 
-def _absorbed(tau: Colour | None, path: Scalar) -> Any:
-    return 1.0 if tau is None else transmittance(tau, path)
-
-
 def _reflected_above(T: Scalar, R: Colour, tau: Colour | None, cosine: Scalar) -> Colour:
     """Add an interface below a stack that reflects R: what the two send back down, with absorption between them."""
-    back = R * _absorbed(tau, safe_divide(2.0, cosine))
+    back = R * remains(tau, safe_divide(2.0, cosine))
     F = 1.0 - T
     return F + T * T * back / jnp.maximum(1.0 - F * back, 1e-6)
 
@@ -298,7 +212,7 @@ def _bounced(target: Lobe, below: _Below, options: Corrected) -> Colour:
 
 def _by_lobes(lobes: Colour, R: Colour, crossing: Crossing, tau: Colour | None) -> Colour:
     """Gain of a diffuse part by light of one direction that the lobes send to the coat first, and the coat back."""
-    return 1.0 / jnp.maximum(1.0 - lobes * R * _absorbed(tau, safe_divide(2.0, crossing.w[2])), 1e-6)
+    return 1.0 / jnp.maximum(1.0 - lobes * R * remains(tau, safe_divide(2.0, crossing.w[2])), 1e-6)
 
 
 def _returned(target: Lobe, below: _Below, options: Corrected) -> Colour:
@@ -306,7 +220,7 @@ def _returned(target: Lobe, below: _Below, options: Corrected) -> Colour:
     R = 0.5 * (below.R_i + below.R_o)
     if not options.edge:
         return R
-    alpha = _mean_width(target.width)
+    alpha = mean_width(target.width)
     edge_i = edge_reflection(below.sin_i, below.i.w[2], below.n, alpha)
     edge_o = edge_reflection(below.sin_o, below.o.w[2], below.n, alpha)
     return R + (1.0 - R) * (0.5 * (edge_i + edge_o))
@@ -363,22 +277,16 @@ def _power(x: Scalar, p: float) -> Scalar:
 
 def trapped_light(lobe: Lobe, tau: Colour | None, n: Scalar) -> Colour:
     """Radiance factor [1/sr] of light kept below the coat by total reflection until a rough base frees it."""
-    alpha = jnp.minimum(_mean_width(lobe.width), 1.0)
+    alpha = jnp.minimum(mean_width(lobe.width), 1.0)
     a2 = alpha * alpha
     scattered = 0.95 * (1.0 - 0.6 * alpha) * a2 / (a2 + 0.03)
     lost = 1.55 * a2 / (1.0 + 1.3 * a2)
     critical = safe_sqrt((1.0 - 1.0 / n) * (1.0 + 1.0 / n))
-    t = _absorbed(tau, safe_divide(3.0, critical))
+    t = remains(tau, safe_divide(3.0, critical))
     F0 = lobe.energy(lobe.reflectance(jnp.ones_like(n)))
     kept = jnp.maximum(0.0, 1.0 - lost - scattered / (n * n))
     freed = F0 * F0 * scattered * scattered * (critical * critical) * t / jnp.pi
     return where(critical > 1e-4, freed / jnp.maximum(1.0 - F0 * kept * t, 1e-6), 0.0)
-
-
-def _nodes(dtype: np.dtype) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss-Legendre nodes and weights on [0, 1], enough for the precision of `dtype`."""
-    x, w = np.polynomial.legendre.leggauss(16 if dtype == np.float32 else 64)
-    return (0.5 * (x + 1.0)).astype(dtype), (0.5 * w).astype(dtype)
 
 
 def _scattered(prepared: Prepared, below: _Below, options: Corrected) -> Colour:
@@ -396,83 +304,3 @@ def _scattered(prepared: Prepared, below: _Below, options: Corrected) -> Colour:
         spread = spread + both * haze.width_power(width)
     i, o = way(below.i, below.R_i), way(below.o, below.R_o)
     return haze.scattered(prepared.haze, prepared.coats[-1], prepared.base, i, o, spread)
-
-
-# Not for speed: outside of a trace, a scan over a new function would compile again at every call.
-@jax.jit
-def _escape(coats: list[Coat], interfaces: list[Interface], lobes: Colour | None = None) -> Colour:
-    """Part of the light of a diffuse base that gets out at its first try: 2 int x mu dmu, x = 1 - R exp(-2 tau / mu).
-
-    Of a base with lobes of albedo s too, 2 int x / (1 - s + s x) mu dmu.
-    """
-
-    def tries(S: Colour, cosine: Scalar) -> list[Colour]:
-        x = S + (1.0 - S) * _lost(coats[-1].extinction, cosine)
-        return [x if lobes is None else x / jnp.maximum(1.0 - lobes + lobes * x, 1e-6)]
-
-    return _over_directions(tries, coats, interfaces)[0]
-
-
-@jax.jit
-def _haze(coats: list[Coat], interfaces: list[Interface], base: Any) -> haze.Haze:
-    """What the innermost coat does to light that it scatters."""
-
-    def mean(f: Callable[[Colour, Scalar], Sequence[Colour]]) -> Sequence[Colour]:
-        return _over_directions(lambda S, cosine: f(1.0 - S, cosine), coats, interfaces)
-
-    return haze.prepare(coats[-1], base, interfaces[-1].n, mean)
-
-
-def _over_directions(
-    f: Callable[[Colour, Scalar], Sequence[Colour]], coats: list[Coat], interfaces: list[Interface]
-) -> Sequence[Colour]:
-    """2 int f(S, mu) mu dmu over the directions in the innermost medium, mu from 0 to 1; S is what passes up and out."""
-    n = interfaces[-1].n
-    n_above = interfaces[-2].n if len(interfaces) > 1 else jnp.ones_like(n)
-    # Directions are counted by their cosine u^3 in the rarer of the two media: there the integrand is smooth, at any
-    # width, and the cube gathers nodes where short paths through a thin medium make it steep.
-    rare = jnp.minimum(n, n_above)
-    cone = (rare / n) ** 2
-
-    def at(u: Scalar) -> Sequence[Colour]:
-        u2 = u * u
-        u3 = u2 * u
-        jacobian = 6.0 * u2 * u3
-        p2 = (1.0 - u3) * (1.0 + u3) * rare * rare
-        S = _passed_up(coats, interfaces, p2)
-        cosine = safe_sqrt((rare * u3) ** 2 + (n - rare) * (n + rare)) / n
-        outside = u3 * safe_sqrt(1.0 - cone)
-        within, beyond = f(S, cosine), f(jnp.zeros_like(S), outside)
-        return [jacobian * (cone * w + (1.0 - cone) * b) for w, b in zip(within, beyond, strict=True)]
-
-    def accumulate(total: Sequence[Colour], node: tuple[Scalar, Scalar]) -> tuple[Sequence[Colour], None]:
-        u, weight = node
-        return [t + weight * value for t, value in zip(total, at(u), strict=True)], None
-
-    u, weight = _nodes(n.dtype)
-    # A colour as soon as anything is: a medium above, a lobe.
-    zeros = [jnp.zeros(x.shape, x.dtype) for x in jax.eval_shape(at, n)]
-    return jax.lax.scan(accumulate, zeros, (jnp.asarray(u), jnp.asarray(weight)))[0]
-
-
-def _lost(tau: Colour | None, cosine: Scalar) -> Any:
-    """Absorbed on the way up and down again."""
-    return 0.0 if tau is None else -jnp.expm1(-tau * safe_divide(2.0, cosine))
-
-
-def _passed_up(coats: list[Coat], interfaces: list[Interface], p2: Scalar) -> Colour:
-    """Part of the light from below that leaves the stack; p2 = (n sin)^2, the same in every medium."""
-    S: Any = 1.0
-    n_above = jnp.ones_like(interfaces[0].n)
-    for depth, (coat, interface) in enumerate(zip(coats, interfaces, strict=True)):
-        cosine2 = 1.0 - p2 / (n_above * n_above)
-        w = jnp.stack([safe_sqrt(p2) / n_above, jnp.zeros_like(p2), safe_sqrt(cosine2)])
-        c = where(coat.eta >= 1.0, facet_cosine(w, interface.tilt), w[2])
-        T = where(cosine2 > 0.0, with_second_facet(coat.transmittance(c), interface.gain), 0.0)
-        if depth == 0:
-            S = T
-        else:
-            back = (1.0 - S) * _absorbed(coats[depth - 1].extinction, safe_divide(2.0, w[2]))
-            S = T * (1.0 - back) / jnp.maximum(1.0 - (1.0 - T) * back, 1e-6)
-        n_above = interface.n
-    return S
