@@ -103,7 +103,7 @@ class _Fit:
             u, cost, converged, gram = self._descend(u, self.blocks, FINE_STEPS, f"fine {k + 1}", best.start)
             self.progress("fine", (k + 1) / ROUNDS)
         held = (u <= self.bounds[0]) | (u >= self.bounds[1])
-        uncertainty = estimate(gram, cost, self._residuals(), held, self._parts(u))
+        uncertainty = estimate(gram, held, self._residuals(), *self._parts(u))
         models = self._models(u)
         clock = CLOCK.since(self.clock)
         return FitResult(
@@ -223,12 +223,13 @@ class _Fit:
             polished.append(Minimum(minimum.start, u, cost))
         return sorted(polished, key=lambda m: m.cost) + found[3:]
 
-    def _parts(self, u: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Gradient and J^T J of parts of the image: sectors around the highlight, each with a share of every half angle."""
+    def _parts(self, u: np.ndarray) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
+        """Scatter of the gradient; and gradient and J^T J of parts of the image: sectors around the highlight, each with a share of every
+        half angle."""
         sector = self.layout.scatter([_sectors(samples, GROUPS) for samples in self.samples], -1.0)
         groups = sector == np.arange(GROUPS)[:, None, None]
-        found = parts(u, self.start, self.blocks, groups, free=self.free)
-        return [(np.asarray(gradient), np.asarray(gram)) for _, (gradient, gram) in found]
+        scatter, found = parts(u, self.start, self.blocks, groups, free=self.free)
+        return scatter, [(np.asarray(gradient), np.asarray(gram)) for _, (gradient, gram) in found]
 
 
 def _have_no_effect(names: Sequence[str]) -> str:

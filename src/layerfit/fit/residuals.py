@@ -13,7 +13,7 @@ from ..render import shade
 from ..stack import Stack, prepared
 from .blocks import Block
 from .parameters import Parametrisation
-from .solve import Normal, columns, normal_equations, products, tangents
+from .solve import Normal, columns, normal_equations, products, scores, tangents
 
 
 def depths(layer: Any) -> list[str]:
@@ -93,16 +93,24 @@ def step(
     return _solver_step(u, state, bounds, total, free=free, solver=solver)
 
 
-def parts(u: Any, start: Stack, blocks: Sequence[Block], groups: np.ndarray, *, free: Parametrisation) -> list[Normal]:
-    """Normal equations of groups of pixels, from one evaluation of the model at `u`; `groups` (groups, blocks, pixels) are masks."""
+def parts(
+    u: Any, start: Stack, blocks: Sequence[Block], groups: np.ndarray, *, free: Parametrisation
+) -> tuple[np.ndarray, list[Normal]]:
+    """Products of the pixels' gradients, summed, and normal equations of groups of pixels, from one evaluation of the model at `u`.
+
+    `groups` (groups, blocks, pixels) are masks.
+    """
     slots = tuple(f.slots for f in free.free)
     evaluated = [
         [np.asarray(column) for column in part] for part in _started(np.asarray(u).astype(np.float32), start, blocks, free)
     ]
-    return [
+    gradients = (scores(part, slots) for part in evaluated)
+    scatter = np.sum([gradient @ gradient.T for gradient in gradients], 0)
+    equations = [
         normal_equations(np.sum([products([c * m for c in part]) for part, m in zip(evaluated, mask, strict=True)], 0), slots)
         for mask in groups
     ]
+    return scatter, equations
 
 
 NEAR = 1e4

@@ -48,6 +48,16 @@ def products(columns: Sequence[Any]) -> np.ndarray:
     return rows @ rows.swapaxes(1, 2)
 
 
+def scores(columns: Sequence[Any], slots: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    """Each pixel's own part of the gradient, (parameters, pixels), in float64; `slots` as for `normal_equations`.
+
+    By pixels, not by residuals: errors of the channels of one pixel are of the same light paths, and alike.
+    """
+    *derivatives, residual = (np.asarray(column, float) for column in columns)
+    parts = [column * residual for column in derivatives]
+    return np.concatenate([part if len(at) > 1 else part.sum(0, keepdims=True) for part, at in zip(parts, slots, strict=True)])
+
+
 def normal_equations(products: Float[Array, "c k k"], slots: tuple[tuple[int, ...], ...]) -> Normal:
     """Half the sum of squares, its gradient and J^T J; `slots` are the places of each field's entries in the vector of parameters."""
     channels = len(products)

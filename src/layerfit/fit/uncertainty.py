@@ -16,6 +16,10 @@ WEAK_SIGMA = 0.5
 GROUPS = 12
 """Parts of the image that the jackknife leaves out in turn."""
 
+CHANCE = 2.25
+"""Variance by twelve parts over that by pixels which an image without misfit exceeds one time in a hundred: chi^2 of 11 degrees of
+freedom, over 11. The larger of two estimates, without such a bound, would on average be a tenth too wide."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Uncertainty:
@@ -36,13 +40,14 @@ class Uncertainty:
 
 
 def estimate(
-    gram: np.ndarray, loss: float, residuals: int, held: np.ndarray, groups: Sequence[tuple[np.ndarray, np.ndarray]]
+    gram: np.ndarray, held: np.ndarray, residuals: int, scatter: np.ndarray, groups: Sequence[tuple[np.ndarray, np.ndarray]]
 ) -> Uncertainty:
     """Covariance of the parameters that are not held on a bound.
 
-    The larger of two, parameter by parameter: residual scatter through J^T J, as if residuals were independent; and a jackknife over
-    parts of the image, `groups` of (gradient, J^T J) at the solution, one Newton step each: systematic misfit, which a closed form always
-    has, pulls the parts apart and shows there only.
+    The gradients of the pixels scatter as their errors do, whatever the weights expected: `scatter`, the sum of their products, between two
+    inverses of J^T J (Huber 1967; White 1980), over the degrees of freedom. That takes pixels as independent. Systematic misfit,
+    which a closed form always has, is alike in neighbours, and pulls parts of the image apart: a jackknife over `groups` of (gradient,
+    J^T J), one Newton step each, widens what it finds to be wider than chance makes it.
     """
     n = len(gram)
     free = np.flatnonzero(~held)
@@ -55,20 +60,32 @@ def estimate(
         blind.append(np.eye(n)[i])
     if usable.size:
         at = np.ix_(usable, usable)
-        scaled = gram[at] / np.outer(scale[usable], scale[usable])
-        values, vectors = np.linalg.eigh(scaled)
-        for value, vector in zip(values, vectors.T, strict=True):
-            if value < BLIND:
-                full = np.zeros(n)
-                full[usable] = vector
-                blind.append(full)
-        inverse = (vectors / np.maximum(values, BLIND)) @ vectors.T / np.outer(scale[usable], scale[usable])
-        scatter = 2.0 * loss / max(residuals - len(usable), 1)
+        unit = np.outer(scale[usable], scale[usable])
+        values, vectors = np.linalg.eigh(gram[at] / unit)
+        for vector in vectors.T[values < BLIND]:
+            full = np.zeros(n)
+            full[usable] = vector
+            blind.append(full)
+        freedom = residuals / max(residuals - len(usable), 1)
+        spread = freedom * _sandwich(values, vectors, scatter[at] / unit) / unit
         moves = np.array([_newton(gram[at] - part_gram[at], -part[usable]) for part, part_gram in groups])
-        spread = (len(groups) - 1) / max(len(groups), 1) * (moves - moves.mean(0)).T @ (moves - moves.mean(0))
-        factor = np.sqrt(np.maximum(np.diag(spread) / np.maximum(np.diag(scatter * inverse), 1e-300), 1.0))
-        covariance[at] = scatter * inverse * np.outer(factor, factor)
+        apart = (len(groups) - 1) / max(len(groups), 1) * np.sum((moves - moves.mean(0)) ** 2, 0)
+        ratio = apart / np.maximum(np.diag(spread), 1e-300)
+        factor = np.sqrt(np.maximum(ratio - (CHANCE - 1.0), 1.0))
+        covariance[at] = spread * np.outer(factor, factor)
     return Uncertainty(covariance, blind)
+
+
+def _sandwich(values: np.ndarray, vectors: np.ndarray, scatter: np.ndarray) -> np.ndarray:
+    """Scatter between two inverses of the scaled J^T J, by its eigenvalues and eigenvectors.
+
+    Along a direction that is not seen no gradient scatters: there it is taken for what it is on average, at the least eigenvalue.
+    """
+    seen = values >= BLIND
+    inside = np.where(np.outer(seen, seen), vectors.T @ scatter @ vectors, 0.0)
+    inside += np.diag(np.where(seen, 0.0, BLIND * np.mean(np.diag(scatter))))
+    inverse = vectors / np.maximum(values, BLIND)
+    return inverse @ inside @ inverse.T
 
 
 def _newton(gram: np.ndarray, gradient: np.ndarray) -> np.ndarray:
