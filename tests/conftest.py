@@ -13,11 +13,14 @@ import jaxtyping
 import pytest
 from jax.extend import source_info_util
 
+from layerfit._compiled import FUSION
+
 if TYPE_CHECKING:
     import moderngl
 
 # Tests compile much and compute little. What computes much, the fit and the walk, is compiled as its users have it.
-os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false")
+_FLAGS = "--xla_backend_optimization_level=0" + (f" --{FUSION}=false" if FUSION else "")
+os.environ.setdefault("XLA_FLAGS", _FLAGS)
 
 REPOSITORY = Path(__file__).parents[1]
 

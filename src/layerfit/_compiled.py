@@ -22,9 +22,13 @@ class Clock:
 
 CLOCK = Clock()
 
-OPTIONS: Any = {"xla_disable_hlo_passes": "call-inliner", "xla_cpu_use_fusion_emitters": False}
+FUSION: Any = "xla_cpu_use_fusion_emitters" if jax.__version_info__ < (0, 11) else None
+"""XLA's option for its newer emitters of fused loops, where it is one: later versions have no others, and a name that XLA does
+not know is an error."""
+
+OPTIONS: Any = {"xla_disable_hlo_passes": "call-inliner"} | ({FUSION: False} if FUSION else {})
 """Shading functions stay functions: inlined, they are fused to loops of a thousand operations, which LLVM no longer vectorises (two
-to four times slower). XLA's newer emitters of fused loops are off: they take up to twice as long to compile these."""
+to four times slower). The newer emitters take up to twice as long to compile these."""
 
 _POOL = ThreadPoolExecutor(2, "compile")
 
