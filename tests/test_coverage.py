@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from coverage import MODELS, limits, noisy, pulls, row, shares, view_of
+from sigma_coverage import MODELS, limits, noisy, pulls, row, shares, view_of
 
 pytestmark = pytest.mark.slow
 

@@ -1,6 +1,6 @@
 """Whether sigmas are true: fits of the model's own images under noise that is drawn anew, and how far they end from what made the image.
 
-    python benchmarks/coverage.py [MODEL ...] [--fits 100] [--noise 0.02] [--exponent 0.7] [--output pulls.csv]
+    python benchmarks/sigma_coverage.py [MODEL ...] [--fits 100] [--noise 0.02] [--exponent 0.7] [--output pulls.csv]
 
 The pull of a value is (found - true) / sigma. Gaussian errors of true sigmas leave 68.3 % of pulls within 1 and 95.4 % within 2, with mean 0 and
 standard deviation 1. One row a parameter, the channels of a colour together, and one for all of a model. Behind the shares stand the 95 % limits of
