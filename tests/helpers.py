@@ -5,6 +5,7 @@ against float64 at the SAME rounded inputs: an index of 1.0001 loses three digit
 formula can give back.
 """
 
+import dataclasses
 import functools
 import json
 from collections.abc import Mapping
@@ -15,10 +16,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from layerfit.capture.exr import write_exr
+from layerfit.capture.geometry import sphere_surface
+from layerfit.capture.samples import View, load_reference
+from layerfit.capture.scene import Camera, Directional, Reference, Sphere
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
+from layerfit.render import predict
 from layerfit.stack import Stack, evaluate
 from layerfit.surfaces import (
     Blinn,
@@ -226,3 +232,15 @@ APPROXIMATE: dict[str, Stack] = {
     "faithful, Lazanyi": Stack((varnish(fresnel="lazanyi"),), CookTorrance(fresnel="lazanyi", **COPPER), Faithful()),
 }
 """Fresnel reflectances that are not exact."""
+
+
+def sphere_view(stack: Stack, folder: Path, side: int) -> View:
+    """A sphere of a material under one distant light, drawn by the model at `side` x `side` pixels, as a fit sees it."""
+    camera = Camera((0.8, 0.6, 4.9), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0)
+    covered = sphere_surface(Sphere(), camera, side, side).covered
+    path = folder / "sphere.exr"
+    write_exr(path, dict.fromkeys("RGB", np.where(covered, 0.5, 0.0)) | {"A": covered.astype(float)})
+    sun = Directional((0.46175709, 0.55410852, 0.69263564), (np.pi, np.pi, np.pi))
+    view = load_reference(Reference(path, camera, (sun,), Sphere(), {}, None, {}), 0.1)
+    image = predict(stack, *view.samples(np.arange(len(view.index))).arrays)
+    return dataclasses.replace(view, target=image.astype(np.float32))

@@ -12,11 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from helpers import COPPER, FLOOR, brdf, brdf_rows, cases, close, direction, hemisphere, varnish
-from layerfit.capture.exr import write_exr
-from layerfit.capture.geometry import sphere_surface
-from layerfit.capture.samples import load_reference
-from layerfit.capture.scene import Camera, Directional, Reference, Sphere
+from helpers import COPPER, FLOOR, brdf, brdf_rows, cases, close, direction, hemisphere, sphere_view, varnish
 from layerfit.errors import InputError
 from layerfit.fit.fit import fit
 from layerfit.fit.result import parameters
@@ -407,15 +403,8 @@ TRUTH = Stack((), Conductor(alpha=0.3, film_nm=62.0, film_eta=2.4, **TITANIUM))
 
 @pytest.fixture(scope="module")
 def sphere(tmp_path_factory):
-    """A sphere of titanium with a film, drawn by the model at 32 x 32 pixels."""
-    camera = Camera((0.8, 0.6, 4.9), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0)
-    covered = sphere_surface(Sphere(), camera, 32, 32).covered
-    path = tmp_path_factory.mktemp("film") / "sphere.exr"
-    write_exr(path, dict.fromkeys("RGB", np.where(covered, 0.5, 0.0)) | {"A": covered.astype(float)})
-    sun = Directional((0.46175709, 0.55410852, 0.69263564), (np.pi, np.pi, np.pi))
-    view = load_reference(Reference(path, camera, (sun,), Sphere(), {}, None, {}), 0.1)
-    image = predict(TRUTH, *view.samples(np.arange(len(view.index))).arrays)
-    return dataclasses.replace(view, target=image.astype(np.float32))
+    """A sphere of titanium with a film."""
+    return sphere_view(TRUTH, tmp_path_factory.mktemp("film"), 32)
 
 
 @pytest.mark.parametrize("start", [20.0, 400.0])

@@ -8,13 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from helpers import COPPER, FLOOR, REL, brdf_rows, cases, close, coat_of, hemisphere, surface_of
+from helpers import COPPER, FLOOR, REL, brdf_rows, cases, close, coat_of, hemisphere, sphere_view, surface_of
 from layerfit._compiled import Compiled
 from layerfit._place import Place
-from layerfit.capture.exr import write_exr
-from layerfit.capture.geometry import sphere_surface
-from layerfit.capture.samples import load_reference
-from layerfit.capture.scene import Camera, Directional, Reference, Sphere
 from layerfit.errors import InputError
 from layerfit.fit.fit import fit
 from layerfit.fit.result import parameters, unidentified
@@ -381,15 +377,8 @@ TRUTH = Stack((Patina(years=9.0, softness=0.08, tau=[0.3, 0.6, 1.2], **CRUST),),
 
 @pytest.fixture(scope="module")
 def sphere(tmp_path_factory):
-    """A sphere of the patina, drawn by the model at 40 x 40 pixels."""
-    camera = Camera((0.8, 0.6, 4.9), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0)
-    covered = sphere_surface(Sphere(), camera, 40, 40).covered
-    path = tmp_path_factory.mktemp("patina") / "sphere.exr"
-    write_exr(path, dict.fromkeys("RGB", np.where(covered, 0.5, 0.0)) | {"A": covered.astype(float)})
-    sun = Directional((0.46175709, 0.55410852, 0.69263564), (np.pi, np.pi, np.pi))
-    view = load_reference(Reference(path, camera, (sun,), Sphere(), {}, None, {}), 0.1)
-    image = predict(TRUTH, *view.samples(np.arange(len(view.index))).arrays)
-    return dataclasses.replace(view, target=image.astype(np.float32))
+    """A sphere of the patina."""
+    return sphere_view(TRUTH, tmp_path_factory.mktemp("patina"), 40)
 
 
 @pytest.fixture(scope="module")

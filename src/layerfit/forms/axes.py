@@ -71,6 +71,7 @@ def share_along(w: Vec3) -> Scalar:
 @chunk
 def mixed(tangent: Interface, across: Interface, share: Scalar) -> Interface:
     """The mean of two rough tops, `share` of the first."""
+    # Part by part and by name: so it is printed, and mapped over the parts it would print as one line without an end.
     rest = 1.0 - share
     tilt = share * tangent.tilt + rest * across.tilt
     gain = share * tangent.gain + rest * across.gain
