@@ -20,12 +20,12 @@ def image_error(image: np.ndarray, reference: np.ndarray, covered: np.ndarray) -
     white = exposure(reference, covered)
     shown, wanted = (np.where(covered[..., None], display(x, white), 0.0) for x in (image, reference))
     error = np.mean((shown[covered] - wanted[covered]) ** 2)
-    similarity: Any = structural_similarity(wanted, shown, channel_axis=-1, data_range=1.0, full=True)[1]
+    similarity: Any = structural_similarity(wanted, shown, channel_axis=-1, data_range=1.0, full=True)
     delta_e = deltaE_ciede2000(rgb2lab(wanted[covered]), rgb2lab(shown[covered]))
     return {
         "rel_l2": rel_l2,
         "psnr_db": float(10.0 * np.log10(1.0 / np.maximum(error, 1e-12))),
-        "ssim": float(np.mean(similarity[covered])),
+        "ssim": float(np.mean(similarity[1][covered])),
         "delta_e": float(np.mean(delta_e)),
     }
 

@@ -58,7 +58,7 @@ def scores(columns: Sequence[Any], slots: tuple[tuple[int, ...], ...]) -> np.nda
     return np.concatenate([part if len(at) > 1 else part.sum(0, keepdims=True) for part, at in zip(parts, slots, strict=True)])
 
 
-def normal_equations(products: Float[Array, "c k k"], slots: tuple[tuple[int, ...], ...]) -> Normal:
+def normal_equations(products: Float[Array, "c k k"] | np.ndarray, slots: tuple[tuple[int, ...], ...]) -> Normal:
     """Half the sum of squares, its gradient and J^T J; `slots` are the places of each field's entries in the vector of parameters."""
     channels = len(products)
     size = sum(len(s) for s in slots)
