@@ -4,6 +4,7 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import nist
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -188,3 +189,23 @@ def test_a_direction_that_nothing_sees_is_named():
     assert len(found.blind) == 1
     np.testing.assert_allclose(np.abs(found.blind[0]), [0.5**0.5, 0.5**0.5, 0.0], atol=1e-9)
     assert np.all(found.sigma[:2] > 10.0 * found.sigma[2]), "what is not seen is not known"
+
+
+@pytest.mark.parametrize("name", nist.MODELS)
+def test_a_problem_of_nist_is_what_its_file_says(name):
+    """Its model at the certified values leaves the certified sum of squares."""
+    problem = nist.read(name)
+    assert len(problem.certified) == len(problem.starts[0]) == len(problem.starts[1])
+    rss = float(np.sum(np.asarray(nist.residual(problem)(list(problem.certified))) ** 2))
+    assert rss == pytest.approx(problem.rss, rel=1e-8, abs=1e-20)  # of eleven digits; Lanczos1 is exact but for rounding
+
+
+@pytest.mark.parametrize(("name", "start"), [("Misra1a", 0), ("Nelson", 1), ("Gauss2", 0), ("Thurber", 0), ("Rat43", 0)])
+def test_certified_values_of_nist_are_found(name, start):
+    problem = nist.read(name)
+    usual, steps, done = nist.solve(problem, problem.starts[start], nist.AS_IN_A_FIT)
+    assert done
+    assert steps < 60
+    assert nist.digits(usual, problem.certified) > 3.5  # a step below 1e-5 is the last one
+    tight, _, _ = nist.solve(problem, problem.starts[start], nist.TIGHT)
+    assert nist.digits(tight, problem.certified) > 7.0  # normal equations keep half of the sixteen digits
