@@ -13,14 +13,14 @@ import jaxtyping
 import pytest
 from jax.extend import source_info_util
 
-from layerfit._compiled import FUSION
+from layerfit._compiled import fusion_emitters
 
 if TYPE_CHECKING:
     import moderngl
 
 # Tests compile much and compute little. What computes much, the fit and the walk, is compiled as its users have it.
-_FLAGS = "--xla_backend_optimization_level=0" + (f" --{FUSION}=false" if FUSION else "")
-os.environ.setdefault("XLA_FLAGS", _FLAGS)
+_FLAGS = ["--xla_backend_optimization_level=0", *(f"--{name}=false" for name in fusion_emitters(newer=False))]
+os.environ.setdefault("XLA_FLAGS", " ".join(_FLAGS))
 
 REPOSITORY = Path(__file__).parents[1]
 

@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from layerfit._compiled import fusion_emitters
 from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import sphere_surface
 from layerfit.capture.samples import View, load_reference
@@ -45,7 +46,7 @@ REL = {np.float64: 1e-12, np.float32: 1e-5}
 FLOOR = {np.float64: 1e-13, np.float32: 1e-6}
 
 # What is evaluated a few times only is compiled quickly rather than well: options for `jax.jit`, 2 to 4 times as quick.
-QUICKLY = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
+QUICKLY = {"xla_backend_optimization_level": 0} | fusion_emitters(newer=False)
 
 COPPER = {"eta": [0.201, 0.924, 1.102], "k": [3.913, 2.453, 2.142]}
 

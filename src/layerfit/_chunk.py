@@ -7,6 +7,7 @@ operation clamped to the domain, which is what a shader needs; its derivative is
 """
 
 import dataclasses
+import json
 from collections.abc import Callable
 from functools import partial
 from typing import Any, TypeVar, cast, dataclass_transform
@@ -14,7 +15,7 @@ from typing import Any, TypeVar, cast, dataclass_transform
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import lax
+from jax import export, lax
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., Any])
@@ -63,6 +64,12 @@ def struct(cls: type[T]) -> type[T]:
     # Not `register_dataclass`: to it structures of two classes with fields alike are equal, and where their hashes happen to be so
     # too, one class is given what was compiled for the other.
     jax.tree_util.register_pytree_with_keys(made, with_keys, unflatten, flatten)
+    export.register_pytree_node_serialization(
+        made,
+        serialized_name=f"{made.__module__}.{made.__qualname__}",
+        serialize_auxdata=lambda aux: json.dumps(aux).encode(),
+        deserialize_auxdata=lambda aux: tuple(json.loads(aux)),
+    )
     return made
 
 

@@ -1,12 +1,21 @@
 """Functions compiled ahead of their calls, side by side, with the seconds that went into it."""
 
+import contextlib
 import dataclasses
+import hashlib
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import jax
+from jax import export
+
+from .documents import write_bytes
+from .errors import InputError
 
 
 @dataclasses.dataclass
@@ -22,23 +31,56 @@ class Clock:
 
 CLOCK = Clock()
 
-FUSION: Any = "xla_cpu_use_fusion_emitters" if jax.__version_info__ < (0, 11) else None
-"""XLA's option for its newer emitters of fused loops, where it is one: later versions have no others, and a name that XLA does
-not know is an error."""
 
-OPTIONS: Any = {"xla_disable_hlo_passes": "call-inliner"} | ({FUSION: False} if FUSION else {})
+def fusion_emitters(newer: bool) -> dict[str, Any]:
+    """XLA's option for its newer emitters of fused loops, where it is one: later versions have no others, and a name that XLA does
+    not know is an error."""
+    return {"xla_cpu_use_fusion_emitters": newer} if jax.__version_info__ < (0, 11) else {}
+
+
+OPTIONS: Any = {"xla_disable_hlo_passes": "call-inliner"} | fusion_emitters(newer=False)
 """Shading functions stay functions: inlined, they are fused to loops of a thousand operations, which LLVM no longer vectorises (two
 to four times slower). The newer emitters take up to twice as long to compile these."""
 
 _POOL = ThreadPoolExecutor(2, "compile")
 
+KEPT: list[Path] = []
+"""The folder where traced functions are kept from run to run; empty for none. Tracing them anew was half of a second run's time."""
+
+
+@cache
+def _sources() -> bytes:
+    """What a trace depends on beside its arguments: this package, and the ones that trace."""
+    digest = hashlib.sha256(" ".join(version(name) for name in ("jax", "jaxlib", "equinox", "lineax", "optimistix")).encode())
+    package = Path(__file__).parent
+    for path in sorted(p for p in package.rglob("*") if p.suffix in (".py", ".npz")):
+        digest.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
+    return digest.digest()
+
+
+def _spelled(structure: Any) -> Any:
+    """A structure in full: classes of one name in two modules are two."""
+    kind, aux = structure.node_data() or (None, None)
+    return kind and (kind.__module__, kind.__qualname__, aux, [_spelled(child) for child in structure.children()])
+
+
+def _kept(path: Path) -> export.Exported | None:
+    """A traced function of an earlier run; None where there is none, or not a whole one."""
+    stored = path.read_bytes() if path.is_file() else b""
+    if hashlib.sha256(stored[32:]).digest() != stored[:32]:
+        return None
+    return export.deserialize(bytearray(stored[32:]))
+
 
 class Compiled:
     """A traced function with one executable for each structure and size of its arguments, made when it is first called."""
 
-    def __init__(self, fn: Callable[..., Any], static: tuple[str, ...] = (), optimise: int = 3):
-        """`optimise`: 3 for what runs over pixels, 1 for what runs once a step, 0 for what runs once: it compiles sooner."""
-        self._jit = jax.jit(fn, static_argnames=static)
+    def __init__(self, fn: Callable[..., Any], optimise: int = 3):
+        """Keyword arguments of `fn` are structure, not numbers.
+
+        `optimise`: 3 for what runs over pixels, 1 for what runs once a step, 0 for what runs once: it compiles sooner.
+        """
+        self._fn = fn
         self._options = OPTIONS | {"xla_backend_optimization_level": optimise}
         self._executables: dict[Any, tuple[Future[Any], Any]] = {}
 
@@ -52,15 +94,36 @@ class Compiled:
             start = time.perf_counter()
             executable.result()
             CLOCK.compile_s += time.perf_counter() - start
-        return executable.result()(*args)
+        return executable.result()(*jax.tree.leaves(args))
 
     def _entry(self, args: Any, static: dict[str, Any]) -> tuple[Future[Any], Any]:
         leaves, structure = jax.tree.flatten(args)
         key = (structure, tuple((a.shape, a.dtype) for a in leaves), tuple(static.values()))
         if key not in self._executables:
             start = time.perf_counter()
-            traced = self._jit.trace(*args, **static)
+            traced = self._traced(leaves, structure, static).trace(*leaves)
             lowered = traced.lower()
             CLOCK.trace_s += time.perf_counter() - start
             self._executables[key] = _POOL.submit(lowered.compile, compiler_options=self._options), traced.out_info
         return self._executables[key]
+
+    def _traced(self, leaves: list[Any], structure: Any, static: dict[str, Any]) -> Any:
+        """The function of the leaves of its arguments: as it was kept by an earlier run, or traced and kept."""
+
+        def of_leaves(*leaves: Any) -> Any:
+            return self._fn(*jax.tree.unflatten(structure, leaves), **static)
+
+        of_leaves.__name__ = self._fn.__name__
+        if not KEPT:
+            return jax.jit(of_leaves)
+        shapes = [(a.shape, str(a.dtype)) for a in leaves]
+        machine = jax.dtypes.canonicalize_dtype(float).name, jax.default_backend()
+        what = repr((self._fn.__qualname__, _spelled(structure), shapes, static, machine))
+        path = KEPT[0] / hashlib.sha256(_sources() + what.encode()).hexdigest()
+        exported = _kept(path)
+        if exported is None:
+            exported = export.export(jax.jit(of_leaves))(*leaves)
+            stored = bytes(exported.serialize())
+            with contextlib.suppress(InputError):  # a cache that cannot be written to costs time, no fit
+                write_bytes(path, hashlib.sha256(stored).digest() + stored)
+        return jax.jit(exported.call)

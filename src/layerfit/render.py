@@ -62,7 +62,7 @@ def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any, place: Any) 
     return jnp.sum(jax.vmap(lambda w: evaluate(form, prepared, w, wo))(wi) * weight)
 
 
-_shaded = Compiled(shade, ("form",))
+_shaded = Compiled(shade)
 _BLOCK = 1024
 _LIGHTS = 512
 """Light samples that are summed at once: the quadratures of a fit and of its pictures then share one executable."""

@@ -175,7 +175,7 @@ class _Fit:
         scale = max(sum(self.brightness[: len(blocks)]), 1e-30)
         for k in range(most):
             u, state = self._step(u, state, blocks)
-            error = float(np.sqrt(2.0 * state.loss / scale))
+            error = float(np.sqrt(2.0 * float(state.loss) / scale))
             self.trace.append(Row(time.perf_counter() - self.began, stage, start, k, error))
             if bool(state.done):
                 break

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import jax
@@ -49,15 +48,15 @@ def _columns(material: tuple[Any, Any], block: Block, *, form: Any) -> Any:
 
 
 def _advance(u: Any, state: Any, bounds: Any, total: Any, *, free: Parametrisation, solver: Any) -> Any:
-    """The solver's new point and state, from the products at its trial point."""
+    """The solver's new point and the leaves of its new state, from the products at its trial point."""
     fn = lambda y, args: normal_equations(total, tuple(f.slots for f in free.free))  # noqa: E731
     u, state, _ = solver.step(fn, u, None, {"lower": bounds[0], "upper": bounds[1]}, state, frozenset())
-    return u, state
+    return u, jax.tree.leaves(state)
 
 
-_derivatives = Compiled(_material, ("free",), optimise=1)
-_block_columns = Compiled(_columns, ("form",))
-_solver_step = Compiled(_advance, ("free", "solver"), optimise=1)
+_derivatives = Compiled(_material, optimise=1)
+_block_columns = Compiled(_columns)
+_solver_step = Compiled(_advance, optimise=1)
 
 
 def begin(u: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation) -> None:
@@ -90,7 +89,8 @@ def step(
     # All are started before the first is waited for: what cores there are work side by side.
     started = _started(trial, start, blocks, free)
     total = np.sum([products(part) for part in started], 0)
-    return _solver_step(u, state, bounds, total, free=free, solver=solver)
+    u, leaves = _solver_step(u, state, bounds, total, free=free, solver=solver)
+    return u, jax.tree.unflatten(jax.tree.structure(state), leaves)
 
 
 def parts(
@@ -107,7 +107,9 @@ def parts(
     gradients = (scores(part, slots) for part in evaluated)
     scatter = np.sum([gradient @ gradient.T for gradient in gradients], 0)
     equations = [
-        normal_equations(np.sum([products([c * m for c in part]) for part, m in zip(evaluated, mask, strict=True)], 0), slots)
+        normal_equations(
+            np.sum([products([c * m for c in part]) for part, m in zip(evaluated, mask, strict=True)], 0), slots, np
+        )
         for mask in groups
     ]
     return scatter, equations
@@ -117,7 +119,6 @@ NEAR = 1e4
 """Trust in the first step from a point that is near a minimum: nearly that of Gauss and Newton."""
 
 
-@partial(jax.jit, static_argnames="solver")
 def initial(u: Any, solver: Any, trust: Any = 1.0) -> Any:
     """State of the solver before its first step at `u`; `trust` is the inverse of its damping."""
     return solver.init(None, u, None, {"trust": trust}, None, None, frozenset())

@@ -58,7 +58,7 @@ def scores(columns: Sequence[Any], slots: tuple[tuple[int, ...], ...]) -> np.nda
     return np.concatenate([part if len(at) > 1 else part.sum(0, keepdims=True) for part, at in zip(parts, slots, strict=True)])
 
 
-def normal_equations(products: Float[Array, "c k k"] | np.ndarray, slots: tuple[tuple[int, ...], ...]) -> Normal:
+def normal_equations(products: Float[Array, "c k k"] | np.ndarray, slots: tuple[tuple[int, ...], ...], xp: Any = jnp) -> Normal:
     """Half the sum of squares, its gradient and J^T J; `slots` are the places of each field's entries in the vector of parameters."""
     channels = len(products)
     size = sum(len(s) for s in slots)
@@ -66,9 +66,9 @@ def normal_equations(products: Float[Array, "c k k"] | np.ndarray, slots: tuple[
     entry = np.zeros((len(slots), channels, size))
     for k, at in enumerate(slots):
         entry[k, np.arange(channels), np.array(at)] = 1.0
-    gram = jnp.einsum("kci,ckl,lcj->ij", entry, products[:, :-1, :-1], entry)
-    gradient = jnp.einsum("kci,ck->i", entry, products[:, :-1, -1])
-    return 0.5 * jnp.sum(products[:, -1, -1]), (gradient, gram)
+    gram = xp.einsum("kci,ckl,lcj->ij", entry, products[:, :-1, :-1], entry)
+    gradient = xp.einsum("kci,ck->i", entry, products[:, :-1, -1])
+    return 0.5 * xp.sum(products[:, -1, -1]), (gradient, gram)
 
 
 class _State(eqx.Module):
@@ -103,20 +103,22 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):
         n = y.size
-        empty = self._info(jnp.zeros(()), jnp.zeros(n), jnp.eye(n))
-        zero = jnp.zeros(())
-        trust = jnp.asarray(options.get("trust", 1.0), float)
-        return _State(
-            first=jnp.array(True),
+        # Of NumPy: nothing here is worth a compiler's time.
+        zero = np.zeros(())
+        empty = self._info(zero, np.zeros(n), np.eye(n))
+        trust = np.asarray(options.get("trust", 1.0), float)
+        state = _State(
+            first=np.array(True),
             y_eval=y,
             loss=zero,
-            gradient=jnp.zeros(n),
-            gram=jnp.eye(n),
+            gradient=np.zeros(n),
+            gram=np.eye(n),
             search=eqx.tree_at(lambda s: s.step_size, self.search.init(y, empty), trust),
             step_size=trust,
-            done=jnp.array(False),
+            done=np.array(False),
             result=optx.RESULTS.successful,
         )
+        return jax.tree.map(jnp.asarray, state)
 
     def step(self, fn, y, args, options, state, tags):
         lower, upper = options["lower"], options["upper"]

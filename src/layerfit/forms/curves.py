@@ -14,7 +14,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from .._chunk import chunk, clip, member, safe_divide, safe_sqrt, struct, where
+from .._chunk import chunk, clip, member, safe_divide, safe_sqrt, struct
 from .._types import Colour, Scalar, Vec4
 from ..optics.interface import facet_tilt, rough_transmittance, second_facet
 from . import tables
@@ -196,9 +196,8 @@ def _baking(kind: Kind) -> _Baking:
     part = np.where(below < edge, below / edge, 1.0 + (below - edge) / (1.0 - edge)) - 1.0
     columns = (t.dT, t.rx, t.w, 1.0 + t.kt, np.exp(t.lt), t.Rb)
     x, _ = _gauss()
-    with jax.enable_x64(True), jax.ensure_compile_time_eval():
-        at = lambda parts: np.stack([np.asarray(_cubic(jnp.asarray(p), part)) for p in parts])  # noqa: E731
-        quadrature, cells = at(np.concatenate([x - 1.0, x])), at(np.arange(2 * CELLS + 1) / CELLS - 1.0)
+    at = lambda parts: np.stack([_cubic(p, part, np) for p in parts])  # noqa: E731
+    quadrature, cells = at(np.concatenate([x - 1.0, x])), at(np.arange(2 * CELLS + 1) / CELLS - 1.0)
     return _Baking(
         eta=t.eta.astype(float),
         alpha=t.alpha.astype(float),
@@ -229,7 +228,7 @@ def _gauss() -> tuple[np.ndarray, np.ndarray]:
     return 0.5 * (x + 1.0), 0.5 * weight
 
 
-def _cubic(x: Scalar, nodes: np.ndarray) -> Any:
+def _cubic(x: Any, nodes: np.ndarray, xp: Any = jnp) -> Any:
     """Weights of the values at `nodes` in their C1 cubic interpolant at x, which is held inside the nodes.
 
     Hermite's cubic with the slopes of the parabola through a node and its neighbours (Catmull and Rom 1974, for uneven nodes).
@@ -244,15 +243,13 @@ def _cubic(x: Scalar, nodes: np.ndarray) -> Any:
     slope[0] = 2.0 * slope[0] - slope[1]
     slope[-1, -2:] = -1.0 / h[-1], 1.0 / h[-1]
     slope[-1] = 2.0 * slope[-1] - slope[-2]
-    dtype = x.dtype
-    x = clip(x, float(nodes[0]), float(nodes[-1]))
-    t = (x - jnp.asarray(nodes[:-1], dtype)) / jnp.asarray(h, dtype)
-    inside = (x >= jnp.asarray(nodes[:-1], dtype)) & ((x < jnp.asarray(nodes[1:], dtype)) | (np.arange(n - 1) == n - 2))
+    start, end, h = (xp.asarray(a, x.dtype) for a in (nodes[:-1], nodes[1:], h))
+    x = xp.minimum(xp.maximum(x, float(nodes[0])), float(nodes[-1]))
+    t = (x - start) / h
     u = 1.0 - t
-    value0 = where(inside, (1.0 + 2.0 * t) * u * u, 0.0)
-    value1 = where(inside, (1.0 + 2.0 * u) * t * t, 0.0)
-    slope0 = where(inside, jnp.asarray(h, dtype) * t * u * u, 0.0)
-    slope1 = where(inside, -jnp.asarray(h, dtype) * u * t * t, 0.0)
-    pad = jnp.zeros(1, dtype)
-    value = jnp.concatenate([value0, pad]) + jnp.concatenate([pad, value1])
-    return value + (jnp.concatenate([slope0, pad]) + jnp.concatenate([pad, slope1])) @ jnp.asarray(slope, dtype)
+    here = ((x >= start) & ((x < end) | (np.arange(n - 1) == n - 2))).astype(x.dtype)
+    value0, value1 = here * (1.0 + 2.0 * t) * u * u, here * (1.0 + 2.0 * u) * t * t
+    slope0, slope1 = here * h * t * u * u, -here * h * u * t * t
+    pad = xp.zeros(1, x.dtype)
+    value = xp.concatenate([value0, pad]) + xp.concatenate([pad, value1])
+    return value + (xp.concatenate([slope0, pad]) + xp.concatenate([pad, slope1])) @ xp.asarray(slope, x.dtype)

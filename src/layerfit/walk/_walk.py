@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._compiled import FUSION
+from .._compiled import fusion_emitters
 from ..stack import Stack
 from ._material import Haze, Interface, Material, read
 from ._particle import Tally, start, step
@@ -91,7 +91,7 @@ def walk_rows(
 
 
 # Compiled for speed whatever the process is set to: its loop is long, its text short.
-@partial(jax.jit, compiler_options={"xla_backend_optimization_level": 3} | ({FUSION: True} if FUSION else {}))
+@partial(jax.jit, compiler_options={"xla_backend_optimization_level": 3} | fusion_emitters(newer=True))
 def _run(material: Material, wi: jax.Array, wo: jax.Array, lane: jax.Array, seed: jax.Array, paths: jax.Array) -> Tally:
     """Walk `paths` paths in every lane. Leaves (lanes,), directions (lanes, 3)."""
     light, eye = ((w[:, 0], w[:, 1], w[:, 2]) for w in (wi, wo))
