@@ -23,6 +23,9 @@ WI, WO = (0.5, 0.0, 0.8660254), [(-0.3420201, 0.0, 0.9396926)]
 CASES = {
     "conductor": Stack((Coat(alpha=0.2, eta=1.5, tau=0.2),), Conductor(alpha=0.2)),
     "conductor, three colours": Stack((Coat(alpha=0.2, eta=1.5, tau=[0.1, 0.2, 0.4]),), Conductor(alpha=0.2)),
+    "copper": Stack(
+        (Coat(alpha=0.2, eta=1.5, tau=[0.1, 0.2, 0.4]),), Conductor(alpha=0.2, eta=[0.2, 0.9, 1.1], k=[3.9, 2.5, 2.1])
+    ),
     "white Lambert": Stack((Coat(alpha=0.2, eta=1.5),), Lambert(albedo=1.0)),
     "three layers": Stack((Coat(alpha=0.2, eta=1.5, tau=0.2), Coat(name="primer", alpha=0.3, eta=1.8)), Conductor(alpha=0.2)),
 }

@@ -9,6 +9,7 @@ from functools import reduce
 from operator import add
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
 from .._chunk import struct
@@ -70,6 +71,7 @@ def pick(at: Scalar, values: Sequence[Any]) -> Any:
     return chosen
 
 
+@jax.jit
 def at_facets(
     material: Material, at: Scalar, above: Flag, entering: Flag, w: Direction, c: Scalar | None, target: Direction, u: Uniforms
 ) -> Event:
@@ -82,7 +84,7 @@ def at_facets(
     kinds = [b.kind for b in surfaces] + ([material.base[0].distribution] if faceted else [])
     alpha = pick(at, [b.widths for b in surfaces] + ([widths(material.base[0])] if faceted else []))
     eta = pick(at, [b.eta for b in surfaces])
-    eta = jnp.where(above, eta, 1.0 / eta)
+    eta = where(above, eta, 1.0 / eta)
     at_base = at == len(surfaces)
 
     def by_kind(fn: Callable[..., Any], *args: Any) -> Any:
@@ -93,7 +95,7 @@ def at_facets(
     area = jnp.maximum(by_kind(facet_area, w, alpha), _TINY)
     if c is not None:
         # A particle that arrives has yet to find its height; the floor keeps the lowest facets within reach of the top.
-        c = jnp.maximum(jnp.where(c >= 1.0, next_height(w, c, area, u[0]), c), 1e-7)
+        c = jnp.maximum(where(c >= 1.0, next_height(w, c, area, u[0]), c), 1e-7)
     m = by_kind(sample_facet, w, alpha, u[1], u[2])
     cosine = dot(w, m)
     reflectance = fresnel(cosine, eta)
@@ -101,7 +103,7 @@ def at_facets(
     kept = jnp.ones_like(cosine)
     if single:
         through = through | entering
-        kept = jnp.where(entering, 1.0 - reflectance, 1.0)
+        kept = where(entering, 1.0 - reflectance, 1.0)
     d = where(through, refract(w, m, cosine, eta), reflect(w, m, cosine))
 
     # The facet that would send the particle to the target, and what of it would get there.
@@ -110,26 +112,26 @@ def at_facets(
     h, c_h = where(above, (h_up, c_up), (h_across, c_across))
     D_h = by_kind(facet_density, h, alpha)
     F_h = fresnel(c_h, eta)
-    target_pdf = jnp.where(above, 0.25 * D_h * F_h, c_h * D_h * (1.0 - F_h) * jacobian) / area
+    target_pdf = where(above, 0.25 * D_h * F_h, c_h * D_h * (1.0 - F_h) * jacobian) / area
     # Density of the direction sampled: eta g / (c - g)^2 is the Jacobian of `refracting_facet` from this side, g = eta cos'.
     D_m = by_kind(facet_density, m, alpha)
     g = jnp.sqrt(jnp.maximum((eta - 1.0) * (eta + 1.0) + cosine * cosine, 0.0))
     across = cosine * (1.0 - reflectance) * eta * g / jnp.maximum((cosine - g) * (cosine - g), _TINY)
-    pdf = jnp.where(through, across, 0.25 * reflectance) * D_m / area
+    pdf = where(through, across, 0.25 * reflectance) * D_m / area
 
     if single:
         area_d, area_t = by_kind(facet_area, d, alpha), by_kind(facet_area, target, alpha)
         separable = pick(at, [jnp.asarray(b.separable) for b in surfaces])
         seen = _seen(area, w, area_d, d, through | separable)
         seen_target = _seen(area, w, area_t, target, ~above | separable)
-        kept = jnp.where(d[2] > 0.0, kept * seen * d[2], 0.0)
+        kept = where(d[2] > 0.0, kept * seen * d[2], 0.0)
         leaves, c_next = jnp.full_like(above, True), None
     else:
         assert c is not None
         behind_d, behind_t = by_kind(facet_area, opposite(d), alpha), by_kind(facet_area, opposite(target), alpha)
-        c_next = next_height(opposite(d), jnp.where(through, 1.0 - c, c), behind_d, u[4])
+        c_next = next_height(opposite(d), where(through, 1.0 - c, c), behind_d, u[4])
         leaves = c_next >= 1.0
-        seen_target = leaving(target, jnp.where(above, c, 1.0 - c), behind_t) / target[2]
+        seen_target = leaving(target, where(above, c, 1.0 - c), behind_t) / target[2]
         area_d, area_t = behind_d + d[2], behind_t + target[2]
     # A facet that refracts has Jacobians from both sides that differ by eta^2 alone: densities differ by that and by the areas.
     reverse = area / (eta * eta)
@@ -138,9 +140,9 @@ def at_facets(
         through,
         leaves,
         c_next,
-        (kept,) * len(material.base),
+        (kept,) * material.channels,
         pdf,
-        (target_pdf * seen_target,) * len(material.base),
+        (target_pdf * seen_target,) * material.channels,
         target_pdf,
         pdf * reverse / jnp.maximum(area_d, _TINY),
         target_pdf * reverse / jnp.maximum(area_t, _TINY),
@@ -152,15 +154,15 @@ def at_facets(
     base, to_vec = material.base[0], jnp.stack
     V = base.visibility(to_vec(w), to_vec(d))
     V_target = base.visibility(to_vec(w), to_vec(target))
-    kept = jnp.where(d[2] > 0.0, 4.0 * V * d[2] * area, 0.0)
+    kept = where(d[2] > 0.0, 4.0 * V * d[2] * area, 0.0)
     based = Event(
         d,
         through,
         jnp.full_like(through, True),
         c_next,
-        tuple(kept * b.reflectance(cosine) for b in material.base),
+        material.by_channel(lambda b: kept * b.reflectance(cosine)),
         0.25 * D_m / area,
-        tuple(D_h * V_target * b.reflectance(c_h) for b in material.base),
+        material.by_channel(lambda b: D_h * V_target * b.reflectance(c_h)),
         0.25 * D_h / area,
         event.back,
         event.target_back,
@@ -168,12 +170,14 @@ def at_facets(
     return where(at_base, based, event)
 
 
+@jax.jit
 def _seen(area_w: Scalar, w: Direction, area_d: Scalar, d: Direction, separable: Flag) -> Scalar:
     """G(w, d) / (G1(w) d.z): 1 / (d.z (1 + Lambda)) apart, (1 + Lambda(w)) / (d.z (1 + Lambda(w) + Lambda(d))) together."""
     together = area_w / jnp.maximum(area_w * d[2] + area_d * w[2] - w[2] * d[2], _TINY)
-    return jnp.where(separable, 1.0 / jnp.maximum(area_d, _TINY), together)
+    return where(separable, 1.0 / jnp.maximum(area_d, _TINY), together)
 
 
+@jax.jit
 def at_formula(material: Material, w: Direction, target: Direction, u: Uniforms) -> Event:
     """A base that is a formula, not facets: directions are drawn as its parts would send them, one part as often as another."""
     base = material.base[0]
@@ -198,14 +202,15 @@ def at_formula(material: Material, w: Direction, target: Direction, u: Uniforms)
     d = pick(jnp.floor(u[3] * len(ways)), ways)
     up = d[2] > 0.0
     d = where(up, d, (0.0 * d[0], 0.0 * d[1], 0.0 * d[2] + 1.0))
-    brdf = lambda to: tuple(b.evaluate(jnp.stack(w), jnp.stack(to)) for b in material.base)  # noqa: E731
+    brdf = lambda to: material.by_channel(lambda b: b.evaluate(jnp.stack(w), jnp.stack(to)))  # noqa: E731
     pdf = density(d)
-    weight = tuple(jnp.where(up, f * d[2] / jnp.maximum(pdf, _TINY), 0.0) for f in brdf(d))
+    weight = tuple(where(up, f * d[2] / jnp.maximum(pdf, _TINY), 0.0) for f in brdf(d))
     yes, none = jnp.full(up.shape, True), jnp.zeros_like(w[2])
     c = None if material.interface == "single" else jnp.ones_like(w[2])
     return Event(d, ~yes, yes, c, weight, pdf, brdf(target), density(target), none, none)
 
 
+@jax.jit
 def in_haze(material: Material, g: Scalar, w: Direction, target: Direction, u: Uniforms) -> Event:
     """A particle of haze; frame of the upper side, target above (Henyey and Greenstein 1941, eq. 2)."""
     s = 2.0 * u[1] - 1.0
@@ -217,7 +222,7 @@ def in_haze(material: Material, g: Scalar, w: Direction, target: Direction, u: U
     cos_phi, sin_phi = turn(u[2])
     t = opposite(w)
     # An orthonormal frame about t without a branch (Duff et al. 2017, listing 3).
-    sign = jnp.where(t[2] < 0.0, -1.0, 1.0)
+    sign = where(t[2] < 0.0, -1.0, 1.0)
     a = -1.0 / (sign + t[2])
     b = t[0] * t[1] * a
     x, y = sine * cos_phi, sine * sin_phi
@@ -229,7 +234,7 @@ def in_haze(material: Material, g: Scalar, w: Direction, target: Direction, u: U
     down = d[2] < 0.0
     one = jnp.ones_like(cosine)
     pdf, target_pdf = _henyey_greenstein(cosine, g), _henyey_greenstein(dot(t, target), g)
-    channels = len(material.base)
+    channels = material.channels
     c = None if material.interface == "single" else one
     value = (target_pdf / target[2],) * channels
     return Event(

@@ -1,6 +1,6 @@
 """A stack as the walk reads it: relative indices, widths and media by the number of their boundary, each colour channel apart."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import jax
@@ -55,19 +55,27 @@ class Medium:
 
 @struct
 class Material:
-    """Interfaces from the top, the medium below each, and the base by channel, relative to the medium above it."""
+    """Interfaces from the top, the medium below each, and the base relative to the medium above it.
+
+    `channels` is 3 for a material of any colour, else 1; `base` has as many members or, where it has no colour itself, one.
+    """
 
     boundaries: tuple[Boundary, ...]
     media: tuple[Medium, ...]
     base: tuple[Any, ...]
+    channels: int = static()
     interface: Interface = static()
+
+    def by_channel(self, of: Callable[[Any], Any]) -> tuple[Any, ...]:
+        """What `of` says of the base, for every channel."""
+        found = tuple(of(base) for base in self.base)
+        return found * (self.channels // len(found))
 
 
 def read(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> Material:
     """The material of every row: numbers of the stack have shape (rows,) or, where they are colours, (rows, 3)."""
     check(stack, interface, haze)
-    colour = any(np.ndim(x) > 1 for x in jax.tree.leaves(stack))
-    channels = [_channel(stack, k) for k in range(3 if colour else 1)]
+    channels = [_channel(stack, k) for k in range(3 if _has_colour(stack) else 1)]
     boundaries: list[Boundary] = []
     media: list[Medium] = []
     above = np.ones(1, np.float32)
@@ -85,7 +93,8 @@ def read(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> Materi
         boundaries.append(Boundary(coat.eta / above, widths(coat), kind, coat.masking == "smith_separable"))
         media.append(Medium(tau, scatter))
         above = coat.eta
-    return Material(tuple(boundaries), tuple(media), tuple(_relative(channel.base, above) for channel in channels), interface)
+    bases = [channel.base for channel in channels[: 3 if _has_colour(stack.base) else 1]]
+    return Material(tuple(boundaries), tuple(media), tuple(_relative(b, above) for b in bases), len(channels), interface)
 
 
 def _relative(base: Any, above: Any) -> Any:
@@ -130,6 +139,10 @@ def check(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
     unknown = set(haze) - {coat.name for coat in stack.layers}
     if unknown:
         raise KeyError(f"haze in {sorted(unknown)}, which are no coats; there are {[coat.name for coat in stack.layers]}")
+
+
+def _has_colour(part: Any) -> bool:
+    return any(np.ndim(x) > 1 for x in jax.tree.leaves(part))
 
 
 def _channel(stack: Stack, k: int) -> Stack:

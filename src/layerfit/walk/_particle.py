@@ -13,6 +13,7 @@ Boundaries are counted from the top, the last is the base; medium k lies above b
 import math
 from dataclasses import replace
 
+import jax
 import jax.numpy as jnp
 
 from .._chunk import struct
@@ -83,7 +84,7 @@ def start(material: Material, wo: Direction, path: Bits) -> Particle:
     """A new path, at the eye."""
     one = jnp.ones_like(wo[2])
     zero = 0.0 * one
-    black = tuple(zero for _ in material.base)
+    black = (zero,) * material.channels
     hazy = any(medium.haze for medium in material.media)
     return Particle(
         path=path,
@@ -94,7 +95,7 @@ def start(material: Material, wo: Direction, path: Bits) -> Particle:
         w=wo,
         c=one if material.interface == "multi" else None,
         haze=(one < 0.0, one) if hazy else None,
-        flux=tuple(one for _ in material.base),
+        flux=(one,) * material.channels,
         others=zero,
         exits=tuple(Exit((zero, zero, one), black, zero) for _ in material.media),
         radiance=black,
@@ -108,16 +109,17 @@ def step(
     u = uniforms(lane, p.path, p.event, seed)
     happened = _meet(material, wo, p, u)
     radiance = _connect(material, p, happened)
-    following, ended = _go_on(material, wi, p, happened, u)
-    following = replace(following, radiance=radiance)
+    moved, begun, entering, ended = _go_on(material, wi, p, happened, u)
+    following = replace(where(entering, begun, moved), radiance=radiance)
     counts = ended & (p.path < paths)
     tally = Tally(
-        tuple(s + jnp.where(counts, x, 0.0) for s, x in zip(tally.sum, radiance, strict=True)),
-        tuple(s + jnp.where(counts, x * x, 0.0) for s, x in zip(tally.square, radiance, strict=True)),
+        tuple(s + where(counts, x, 0.0) for s, x in zip(tally.sum, radiance, strict=True)),
+        tuple(s + where(counts, x * x, 0.0) for s, x in zip(tally.square, radiance, strict=True)),
     )
     return where(ended, start(material, wo, p.path + jnp.uint32(1)), following), tally
 
 
+@jax.jit
 def _meet(material: Material, wo: Direction, p: Particle, u: Uniforms) -> Event:
     """What happens where the particle is; its target is the exit from the medium above, or the eye."""
     target = pick(p.at, [wo, *(exit.direction for exit in p.exits)])
@@ -131,6 +133,7 @@ def _meet(material: Material, wo: Direction, p: Particle, u: Uniforms) -> Event:
     return where(p.haze[0], in_haze(material, g, p.w, target, u), happened)
 
 
+@jax.jit
 def _densities(material: Material, p: Particle, up: Scalar, down: Scalar, cosine: Scalar) -> tuple[Scalar, Scalar]:
     """Of a way through boundary `at`: how densely it is taken up from below and down from above, `cosine` being that below.
 
@@ -143,23 +146,24 @@ def _densities(material: Material, p: Particle, up: Scalar, down: Scalar, cosine
     (alpha_x, alpha_y), eta = pick(p.at, [(b.widths, b.eta) for b in material.boundaries])
     peak = 1.0 / (math.pi * alpha_x * alpha_y * (eta - 1.0) * (eta - 1.0))
     first = p.c >= 1.0
-    return jnp.where(first, up, peak), jnp.where(first, down, peak)
+    return where(first, up, peak), where(first, down, peak)
 
 
+@jax.jit
 def _connect(material: Material, p: Particle, happened: Event) -> tuple[Scalar, ...]:
     """Radiance of this path towards the eye, with what this event sends there."""
     zero = jnp.zeros_like(p.others)
     exits = [Exit(p.w, tuple(zero + 1.0 for _ in p.flux), zero), *p.exits]
     exit = pick(p.at, exits)
     up, down = _densities(material, p, happened.target_pdf, happened.target_back, p.w[2])
-    up = jnp.where(p.others > 0.0, up, happened.target_pdf)
+    up = where(p.others > 0.0, up, happened.target_pdf)
     share = 1.0 / (1.0 + up * exit.others + down * p.others)
-    way = (1.0 if p.haze is None else jnp.where(p.haze[0], p.haze[1], 1.0)) / exit.direction[2]
-    way = jnp.where(p.at == 0, 0.0, way)
+    way = (1.0 if p.haze is None else where(p.haze[0], p.haze[1], 1.0)) / exit.direction[2]
+    way = where(p.at == 0, 0.0, way)
     passing = _passing(material, p.at, way, hazy=True)
     below = p.stage == BELOW
     return tuple(
-        r + jnp.where(below, flux * share * value * x * t, 0.0)
+        r + where(below, flux * share * value * x * t, 0.0)
         for r, flux, value, x, t in zip(p.radiance, p.flux, happened.value, exit.passed, passing, strict=True)
     )
 
@@ -167,31 +171,34 @@ def _connect(material: Material, p: Particle, happened: Event) -> tuple[Scalar, 
 def _passing(material: Material, medium: Scalar, way: Scalar, hazy: bool | Flag) -> tuple[Scalar, ...]:
     """What is not absorbed, and where `hazy` not scattered either, on a way through a medium."""
     zero = jnp.zeros_like(way)
-    tau = pick(medium - 1, [tuple(zero for _ in material.base) if m.tau is None else m.tau for m in material.media])
+    tau = pick(medium - 1, [(zero,) * material.channels if m.tau is None else m.tau for m in material.media])
     if any(m.haze for m in material.media):
         haze = pick(medium - 1, [zero if m.haze is None else m.haze.tau for m in material.media])
-        tau = tuple(t + jnp.where(hazy, haze, 0.0) for t in tau)
+        tau = tuple(t + where(hazy, haze, 0.0) for t in tau)
     elif all(m.tau is None for m in material.media):
-        return tuple(zero + 1.0 for _ in material.base)
+        return (zero + 1.0,) * material.channels
     return tuple(jnp.exp(-t * way) for t in tau)
 
 
-def _go_on(material: Material, wi: Direction, p: Particle, happened: Event, u: Uniforms) -> tuple[Particle, Flag]:
-    """The particle at its next event, and whether the path has ended instead."""
+@jax.jit
+def _go_on(
+    material: Material, wi: Direction, p: Particle, happened: Event, u: Uniforms
+) -> tuple[Particle, Particle, Flag, Flag]:
+    """The particle at its next event, that at the start of the second half, whether it is there, and whether the path has ended."""
     d, leaves, eye = happened.d, happened.leaves, p.stage == EYE
     arriving = -d[0], -d[1], d[2]  # where it comes from, in the frame of the next boundary
     upwards = p.above ^ happened.through
-    medium = jnp.where(upwards if p.haze is None else upwards | p.haze[0], p.at, p.at + 1)
+    medium = where(upwards if p.haze is None else upwards | p.haze[0], p.at, p.at + 1)
     flux = tuple(f * w for f, w in zip(p.flux, happened.weight, strict=True))
 
     # Flux that rises: the ways to find it from further down. The first half: the ways from further up, and the exit from a medium.
     up, down = _densities(material, p, happened.pdf, happened.back, p.w[2])
-    rising = jnp.where(p.others > 0.0, (1.0 + down * p.others) / jnp.maximum(up, _TINY), 1.0 / jnp.maximum(happened.pdf, _TINY))
+    rising = where(p.others > 0.0, (1.0 + down * p.others) / jnp.maximum(up, _TINY), 1.0 / jnp.maximum(happened.pdf, _TINY))
     up, down = _densities(material, p, happened.back, happened.pdf, d[2])
     above = pick(p.at, [0.0 * d[2], *(exit.others for exit in p.exits)])
     eta = pick(p.at, [b.eta for b in material.boundaries])
     # Radiance leaves thinner by eta^2 than it is below: reciprocity of refraction (Walter et al. 2007, section 5).
-    flux = tuple(jnp.where(eye & leaves, f / (eta * eta), f) for f in flux)
+    flux = tuple(where(eye & leaves, f / (eta * eta), f) for f in flux)
     exit = Exit(arriving, flux, (1.0 + up * above) / jnp.maximum(down, _TINY))
     alive = flux[0] > 0.0
     exits = tuple(where(eye & leaves & ~upwards & alive & (p.at == k), exit, old) for k, old in enumerate(p.exits))
@@ -199,18 +206,18 @@ def _go_on(material: Material, wi: Direction, p: Particle, happened: Event, u: U
     moved = replace(
         p,
         event=p.event + jnp.uint32(1),
-        stage=jnp.where(leaves & ~eye, BELOW, p.stage),
-        at=jnp.where(leaves, jnp.where(upwards, medium - 1, medium), p.at),
+        stage=where(leaves & ~eye, BELOW, p.stage),
+        at=where(leaves, where(upwards, medium - 1, medium), p.at),
         above=upwards ^ leaves,
         w=where(leaves, arriving, opposite(d)),
-        c=None if happened.c is None else jnp.where(leaves, 1.0, happened.c),
-        others=jnp.where(leaves, jnp.where(upwards, rising, 0.0), p.others),
+        c=None if happened.c is None else where(leaves, 1.0, happened.c),
+        others=where(leaves, where(upwards, rising, 0.0), p.others),
         exits=exits,
     )
     way = 1.0 / jnp.maximum(d[2], _TINY)
     if p.haze is not None:
         moved, way = _drift(material, moved, p.haze, d, upwards, medium, leaves & ~eye, u[6])
-    flux = tuple(jnp.where(leaves, f * t, f) for f, t in zip(flux, _passing(material, medium, way, eye), strict=True))
+    flux = tuple(where(leaves, f * t, f) for f, t in zip(flux, _passing(material, medium, way, eye), strict=True))
 
     # The first half ends above the base or where it turns; the second begins.
     last = p.at == len(material.boundaries) - 1
@@ -218,13 +225,14 @@ def _go_on(material: Material, wi: Direction, p: Particle, happened: Event, u: U
     begun = start(material, wi, p.path)
     begun = replace(begun, event=moved.event, stage=jnp.full_like(p.stage, LIGHT), exits=exits)
     brightest = flux[0] if len(flux) == 1 else jnp.maximum(jnp.maximum(flux[0], flux[1]), flux[2])
-    chance = jnp.minimum(brightest / _FAINT, 1.0) * jnp.where(p.event > _LONG, _LINGER, 1.0)
-    chance = jnp.where(leaves & ~eye, chance, 1.0)
+    chance = jnp.minimum(brightest / _FAINT, 1.0) * where(p.event > _LONG, _LINGER, 1.0)
+    chance = where(leaves & ~eye, chance, 1.0)
     ended = leaves & ~eye & (((p.at == 0) & upwards) | ~(u[5] < chance))
     moved = replace(moved, flux=tuple(f / jnp.maximum(chance, _TINY) for f in flux))
-    return where(entering, begun, moved), ended
+    return moved, begun, entering, ended
 
 
+@jax.jit
 def _drift(
     material: Material,
     moved: Particle,
@@ -237,18 +245,18 @@ def _drift(
 ) -> tuple[Particle, Scalar]:
     """The same with a stop in the haze where the particle is scattered; and how far it comes, in thicknesses."""
     tau = pick(medium - 1, [jnp.zeros_like(u) if m.haze is None else m.haze.tau for m in material.media])
-    depth = jnp.where(haze[0], haze[1], jnp.where(upwards, 1.0, 0.0))
+    depth = where(haze[0], haze[1], where(upwards, 1.0, 0.0))
     cosine = jnp.maximum(d[2], _TINY)
-    way = jnp.where(upwards, depth, 1.0 - depth) / cosine
+    way = where(upwards, depth, 1.0 - depth) / cosine
     free = -jnp.log(u) / jnp.maximum(tau, _TINY)
     stops = can_stop & (free < way)
-    way = jnp.where(can_stop, jnp.minimum(free, way), way)
+    way = where(can_stop, jnp.minimum(free, way), way)
     stopped = replace(
         moved,
         at=medium,
         above=jnp.full_like(stops, True),
-        w=(-d[0], -d[1], jnp.where(upwards, -d[2], d[2])),
+        w=(-d[0], -d[1], where(upwards, -d[2], d[2])),
         others=jnp.zeros_like(u),
     )
-    reached = jnp.where(upwards, depth - way * cosine, depth + way * cosine)
+    reached = where(upwards, depth - way * cosine, depth + way * cosine)
     return replace(where(stops, stopped, moved), haze=(stops, reached)), way

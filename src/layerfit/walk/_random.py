@@ -8,6 +8,7 @@ from .._types import Scalar
 Bits = jax.Array
 
 
+@jax.jit
 def uniforms(lane: Bits, path: Bits, event: Bits, seed: Bits) -> tuple[Scalar, ...]:
     """Eight numbers in (0, 1), float32, for four counters: two rounds of pcg4d (Jarzynski and Olano 2020, listing 4)."""
     # Doubled, so that the two rounds differ in one counter and no two events share one.
@@ -34,6 +35,7 @@ def _pcg4d(*counters: Bits) -> tuple[Bits, ...]:
     return _stir(x, y, z, w)
 
 
+@jax.jit
 def _stir(x: Bits, y: Bits, z: Bits, w: Bits) -> tuple[Bits, ...]:
     x = x + y * w
     y = y + z * x

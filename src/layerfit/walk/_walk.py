@@ -11,12 +11,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._compiled import fusion_emitters
+from .._compiled import OPTIONS, fusion_emitters
 from ..stack import Stack
 from ._material import Haze, Interface, Material, read
 from ._particle import Tally, start, step
 
-LANES = 2048  # particles in flight in one thread: their state stays in its cache
+LANES = 1024  # particles in flight in one thread: their state stays in its cache, and calls cost little beside them
 LONGEST = 2048  # paths of one lane: sums in float32 lose nothing yet, and lanes that are done early wait little
 
 
@@ -69,7 +69,7 @@ def walk_rows(
     if not (np.all(wi[:, 2] > 0.0) and np.all(wo[:, 2] > 0.0)):
         raise ValueError("wi and wo are above the surface: their z is positive")
     # Enough lanes to fill the machine, then enough paths in each to make the wait for the slowest one short.
-    per_lane = int(np.clip(paths * rows // (4 * LANES), 1, LONGEST))
+    per_lane = int(np.clip(paths * rows // (8 * LANES), 1, LONGEST))
     lanes_per_row = -(-paths // per_lane)
     row = np.repeat(np.arange(rows), lanes_per_row)
     lane = np.arange(row.size, dtype=np.uint32)
@@ -90,8 +90,10 @@ def walk_rows(
     return Estimate(mean, np.sqrt(np.maximum(square - mean * mean, 0.0) / (count - 1)))
 
 
-# Compiled for speed whatever the process is set to: its loop is long, its text short.
-@partial(jax.jit, compiler_options={"xla_backend_optimization_level": 3} | fusion_emitters(newer=True))
+# Compiled for speed whatever the process is set to: its loop is long, its text short. Functions under `jax.jit` stay calls, whose results
+# are computed once. Inlined, XLA makes a loop for each number of a particle, and in each does all again that it can do cheaply: eight times
+# the work, most of it random numbers.
+@partial(jax.jit, compiler_options=OPTIONS | {"xla_backend_optimization_level": 3} | fusion_emitters(newer=True))
 def _run(material: Material, wi: jax.Array, wo: jax.Array, lane: jax.Array, seed: jax.Array, paths: jax.Array) -> Tally:
     """Walk `paths` paths in every lane. Leaves (lanes,), directions (lanes, 3)."""
     light, eye = ((w[:, 0], w[:, 1], w[:, 2]) for w in (wi, wo))
