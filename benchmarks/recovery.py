@@ -17,7 +17,7 @@ from renders import Render, errors, renders
 from rich.console import Console
 from rich.table import Table
 
-from layerfit.capture.samples import load
+from layerfit.capture.load import load
 from layerfit.fit.fit import fit
 
 
@@ -30,7 +30,7 @@ def fitted(render: Render) -> tuple[Any, dict[str, Any], float]:
         render.scene.start,
         free=request.free,
         fixed=dict(request.fixed),
-        weights=request.weights,
+        metric=request.metric,
         loss=request.loss,
     )
     return result, result.free.values(result.vector), time.perf_counter() - start

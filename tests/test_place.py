@@ -13,7 +13,7 @@ from layerfit._chunk import static
 from layerfit._fields import layer, param
 from layerfit._place import Place
 from layerfit.capture.geometry import sphere_tangent, sphere_uv
-from layerfit.capture.samples import load
+from layerfit.capture.load import load
 from layerfit.capture.scene import read_scene
 from layerfit.errors import InputError
 from layerfit.fit.fit import fit

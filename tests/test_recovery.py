@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from renders import render
 
-from layerfit.capture.samples import load
+from layerfit.capture.load import load
 from layerfit.fit.fit import fit
 from layerfit.fit.result import to_json
 

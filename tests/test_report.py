@@ -96,12 +96,16 @@ def test_the_page_says_what_the_terminal_says():
 @pytest.mark.parametrize(
     ("weighting", "said"),
     [
-        ({"kind": "uniform", "loss": "square"}, "weights:     the same for every pixel\n"),
+        (
+            {"kind": "uniform", "loss": "square"},
+            "metric:      values, the same for every pixel: for a measured BRDF the cosine-weighted L2\n",
+        ),
+        ({"kind": "log", "loss": "square"}, "metric:      logarithms of values\n"),
         ({"noise": [True], "loss": "square"}, "and the noise that the file states\n"),
         ({"noise": [False], "loss": "square"}, "; no file states its noise\n"),
     ],
 )
-def test_weights_in_words(weighting, said):
+def test_the_metric_in_words(weighting, said):
     document = DOCUMENT | {"weighting": DOCUMENT["weighting"] | weighting}
     assert said in "\n".join(lines(document))
 

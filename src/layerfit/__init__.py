@@ -7,7 +7,8 @@
   Pigment in layers: KubelkaMunk.
 - fit_lazanyi gives a short Fresnel formula of a metal, a Lazanyi.
 - Spectra: metal gives the index of a named Metal, absorption_rgb the Absorption of a coat, both in three channels with their error.
-- References: read_scene gives a Scene, load its View of each reference, from which Samples are drawn; inspect says what an EXR holds.
+- References: read_scene gives a Scene, load its View of each reference, from which Samples are drawn; inspect says what a file holds.
+  read_brdf gives a MeasuredBrdf.
 - Fitting: fit gives a FitResult, parameters its values with sigmas; fit_scene does what `layerfit fit` does; image_error compares pictures.
 - Rendering: predict gives pixels, radiance the same traced, brdf the plain function; Place is where on the surface.
 - Shaders: print_material gives a Shader; shade_samples draws it; check_pairs and check_image compare it with JAX and give a Parity.

@@ -3,7 +3,10 @@
 from ._place import Place as Place
 from .cache import use_compilation_cache as use_compilation_cache
 from .capture.inspect import inspect as inspect
-from .capture.samples import Samples as Samples, View as View, load as load
+from .capture.load import load as load
+from .capture.measured.data import MeasuredBrdf as MeasuredBrdf
+from .capture.measured.read import read_brdf as read_brdf
+from .capture.samples import Samples as Samples, View as View
 from .capture.scene import Scene as Scene, read_scene as read_scene
 from .errors import InputError as InputError, LayerfitError as LayerfitError, MachineError as MachineError
 from .fit.fit import fit as fit

@@ -86,10 +86,11 @@ def fit(
         int | None, typer.Option(min=1, help="Starts that are tried; more find a global minimum more surely.")
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")] = None,
+    metric: Annotated[str | None, typer.Option(help="law, uniform, relative, log or cube_root.")] = None,
     loss: Annotated[str | None, typer.Option(help="square, huber or cauchy.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Fit a material to a reference render.
+    """Fit a material to a reference render or a measured BRDF.
 
     Leaves `fit.json`, `preset.json`, `material.frag`, `report.html`, `fit.png` and `trace.csv` in the output directory.
 
@@ -98,15 +99,23 @@ def fit(
     from .cache import use_compilation_cache
 
     use_compilation_cache()
+    from .capture.scene import LOSSES, METRICS
     from .job import fit_scene
 
     imported = time.perf_counter() - STARTED
-    if loss not in (None, "square", "huber", "cauchy"):
-        raise typer.BadParameter(f"{loss!r} is not square, huber or cauchy", param_hint="--loss")
+    _check_choice(loss, LOSSES, "--loss")
+    _check_choice(metric, METRICS, "--metric")
     with _progress() as report:
-        outcome = fit_scene(scene, output, import_s=imported, progress=report, starts=starts, seed=seed, loss=loss)
+        outcome = fit_scene(
+            scene, output, import_s=imported, progress=report, starts=starts, seed=seed, metric=metric, loss=loss
+        )
     _show_fit(outcome, as_json)
     raise typer.Exit(0 if outcome.good else 1)
+
+
+def _check_choice(value: str | None, known: tuple[str, ...], option: str) -> None:
+    if value is not None and value not in known:
+        raise typer.BadParameter(f"{value!r} is not {', '.join(known[:-1])} or {known[-1]}", param_hint=option)
 
 
 def _show_fit(outcome: Any, as_json: bool) -> None:
@@ -154,7 +163,7 @@ def render(
     from .cache import use_compilation_cache
 
     use_compilation_cache()
-    from .capture.samples import load
+    from .capture.load import load
     from .capture.scene import read_scene
     from .job import write_render
     from .preset import read_preset
@@ -349,10 +358,10 @@ def metal(
 
 @app.command()
 def inspect(
-    file: Annotated[Path, typer.Argument(help="EXR file.")],
+    file: Annotated[Path, typer.Argument(help="EXR file, or a measured BRDF: .brdf, .bsdf, .binary or .csv.")],
     as_json: Json = False,
 ) -> None:
-    """Say what an EXR holds, which channels a fit would use and why, and what looks wrong.
+    """Say what a file holds, what a fit would use of it and why, and what looks wrong: of an EXR, or of a measured BRDF.
 
     Example: `layerfit inspect render.exr`
     """

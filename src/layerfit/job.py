@@ -12,7 +12,10 @@ from typing import Any
 import numpy as np
 
 from .capture.exr import write_exr
-from .capture.samples import QUADRATURE, Samples, View, load
+from .capture.load import AnyView, load
+from .capture.measured.sphere import sphere_of
+from .capture.measured.view import MeasuredView
+from .capture.samples import QUADRATURE, Samples, View
 from .capture.scene import read_scene
 from .documents import check_directory, finite, write_bytes, write_text
 from .errors import InputError
@@ -29,7 +32,7 @@ from .render import predict
 from .report import html, pictures
 from .shader.export import Shader, print_material
 from .shader.gl import renderer
-from .shader.verify import MAX_REL, P999_REL, Parity, check_image, check_pairs, shade_samples, together
+from .shader.verify import FLOOR, MAX_REL, P999_REL, Parity, check_image, check_pairs, compare, shade_samples, together
 from .stack import Stack
 
 Progress = Callable[[str, float], None]
@@ -78,7 +81,7 @@ def fit_scene(
         scene.start,
         free=request.free,
         fixed=dict(request.fixed),
-        weights=request.weights,
+        metric=request.metric,
         loss=request.loss,
         starts=request.starts,
         seed=request.seed,
@@ -113,8 +116,9 @@ def fit_scene(
     document["model"] = _model(result.stack)
     document["model_error"] = against_walk(result.stack.layers, result.stack.base, result.stack.form) or {}
     document["pixels"]["usable"] = sum(len(view.index) for view in result.views)
+    document["metric"] = request.metric
     document["weighting"] = {
-        "kind": request.weights,
+        "kind": request.metric,
         "loss": request.loss,
         "model_share": MODEL_SHARE,
         "floor_share": FLOOR_SHARE,
@@ -153,7 +157,7 @@ def _why(stack: Stack) -> str:
 
 def _quadrature(result: FitResult) -> dict[str, Any] | None:
     """What sampling the lights costs in accuracy; None where every light is exact."""
-    sampled = [(view, s) for view, s in zip(result.views, result.samples, strict=True) if not view.exact]
+    sampled = [(v, s) for v, s in zip(result.views, result.samples, strict=True) if isinstance(v, View) and not v.exact]
     if not sampled:
         return None
     directions = [(_directions(view), s.wi.shape[1]) for view, s in sampled]
@@ -194,7 +198,7 @@ class Drawing:
         white = exposure(target, covered)
         image = self.drawn.image(self.shader)
         return [
-            pictures.shown(f"reference {self.compared.reference.exr.stem}", self.compared.picture, white),
+            pictures.shown(f"reference {self.compared.reference.path.stem}", self.compared.picture, white),
             pictures.shown("fit (JAX)", self.drawn.image(self.model), white),
             pictures.shown("shader (OpenGL)", image, white),
             pictures.difference(image, target, white, covered),
@@ -206,14 +210,17 @@ class Drawing:
         return image_error(self.drawn.image(self.shader), target, self.compared.covered)
 
 
-def draw_all(compared: Sequence[View], drawn: Sequence[View], shader: Shader) -> list[Drawing]:
+def draw_all(compared: Sequence[AnyView], drawn: Sequence[AnyView], shader: Shader) -> list[Drawing]:
     """Draw a material where references were seen, by JAX and by its shader in OpenGL."""
     drawings = []
     for view, whole in zip(compared, drawn, strict=True):
         view.check(shader.stack)
         scale = view.scales(shader.stack)
         thick = shader if scale is None else print_material(scaled(shader.stack, scale), shader.name)
-        drawings.append(draw(view, whole, thick))
+        if isinstance(view, View) and isinstance(whole, View):
+            drawings.append(draw(view, whole, thick))
+        elif isinstance(view, MeasuredView):
+            drawings.append(draw_measured(view, thick))
     return drawings
 
 
@@ -225,6 +232,30 @@ def draw(compared: View, drawn: View, shader: Shader) -> Drawing:
         images.append(shade_samples(shader, *samples.arrays))
     model, image = np.concatenate(models), np.concatenate(images)
     return Drawing(compared, drawn, model, image, check_image(image, model, drawn.index, drawn.shape[1]))
+
+
+@dataclasses.dataclass(frozen=True)
+class MeasuredDrawing(Drawing):
+    """A measured BRDF: a sphere of it, which is drawn to look at, and the samples, whose errors count."""
+
+    samples_error: float
+
+    def error(self) -> dict[str, float]:
+        """`rel_l2` of the samples f cos(theta_i); what a viewer sees is that of the sphere."""
+        return super().error() | {"rel_l2": self.samples_error}
+
+
+def draw_measured(view: MeasuredView, shader: Shader) -> MeasuredDrawing:
+    """Draw a material beside a measured BRDF, and compare its shader with JAX at the samples too."""
+    samples = view.samples()
+    model, values = predict(shader.stack, *samples.arrays), shade_samples(shader, *samples.arrays)
+    sphere = sphere_of(view)
+    drawing = draw(sphere, sphere, shader)
+    describe = lambda row: {"wi": samples.wi[row, 0].tolist(), "wo": samples.wo[row].tolist()}  # noqa: E731
+    floor = FLOOR * float(np.quantile(np.max(model, -1), 0.99))
+    parity = together([drawing.parity, compare(values, model, floor, describe)])
+    error = np.sqrt(np.sum((model - view.target) ** 2) / np.sum(view.target**2))
+    return MeasuredDrawing(sphere, sphere, drawing.model, drawing.shader, parity, float(error))
 
 
 def mean_error(drawings: Sequence[Drawing]) -> dict[str, float]:
@@ -268,14 +299,15 @@ PICTURES = (".exr", ".png")
 """What a render is written as: linear, and for looking at."""
 
 
-def write_render(stack: Stack, views: Sequence[View], output: Path) -> list[Path]:
+def write_render(stack: Stack, views: Sequence[AnyView], output: Path) -> list[Path]:
     """Render a material in place of the references; one file a reference, numbered where there are several."""
     if output.suffix not in PICTURES:
         raise InputError(f"{output}: a picture is written as .exr (linear) or .png; choose one of them with -o")
     check_directory(output.parent)
     written = []
-    for k, view in enumerate(views):
-        view.check(stack)
+    for k, any_view in enumerate(views):
+        view = any_view if isinstance(any_view, View) else sphere_of(any_view)
+        any_view.check(stack)
         path = output if len(views) == 1 else output.with_stem(f"{output.stem}_{k + 1}")
         thick = scaled(stack, view.scales(stack))
         image = view.image(np.concatenate([predict(thick, *samples.arrays) for samples in _portions(view)]))

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from ..errors import InputError
 from .channels import ROLES, Channels, resolve
 from .checks import Finding, check
 from .exr import Exr, read_exr
+from .measured.inspect import MeasuredInspection, inspect_brdf
+from .measured.read import is_measured, read_brdf
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -111,11 +114,14 @@ class Inspection:
 
 def inspect(
     path: str | os.PathLike[str], overrides: Mapping[str, str] | None = None, eye: Sequence[float] | None = None
-) -> Inspection:
+) -> Inspection | MeasuredInspection:
     """Read a file, resolve its channels and check them. `eye`, the camera's position, lets depth and facing be checked as well.
 
-    Raises `InputError` for a file that cannot be read, and for overrides that it does not fit.
+    What ends as a measured BRDF does is read as one, and has neither. Raises `InputError` for a file that cannot be read, and for
+    overrides that it does not fit.
     """
+    if is_measured(Path(path)):
+        return inspect_brdf(read_brdf(Path(path)))
     exr = read_exr(path)
     try:
         channels = resolve(exr, overrides)

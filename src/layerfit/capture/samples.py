@@ -1,6 +1,7 @@
 """From a reference image to flat samples: what the fit, the picture and the shader check are all computed from."""
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from .exr import read_exr
 from .geometry import Surface, frames, normalise, sphere_surface, sphere_tangent, sphere_uv
 from .lights import is_exact, receive
 from .png import read_png
-from .scene import Reference, Scene
+from .scene import Reference
 
 QUADRATURE = 992
 """Directions a pixel for light that is not a point: a pixel is off by 1 % (rms) under the studio map of the examples, with a coat of width .1."""
@@ -43,10 +44,24 @@ class Samples:
     """Standard error of the target where the file has it: its law, never its value at one pixel, informs the weights."""
     index: np.ndarray
     """Row-major place of each pixel in the image."""
-    shape: tuple[int, int]
+    shape: tuple[int, int] | None
+    """Of the image; None for a measured BRDF, where `index` is the place in the file."""
     place: Place | None = None
     """Where on the surface each pixel is: texture coordinates (pixels, 2) where there are any, distance to the camera
     and part of the sky that is seen, both (pixels,)."""
+
+    @property
+    def turn(self) -> np.ndarray:
+        """A number (pixels,) by which parts of the reference are told apart that each hold every half angle: in an image the angle around
+        the highlight, in a measurement the difference angle."""
+        wi = self.wi[np.arange(len(self.index)), np.argmax(self.weight.sum(-1), 1)]
+        h = wi + self.wo
+        if self.shape is None:
+            return -np.linalg.norm(h, axis=-1)
+        peak = self.index[np.argmin(np.hypot(h[:, 0], h[:, 1]) / np.maximum(h[:, 2], 1e-6))]
+        y, x = np.divmod(self.index, self.shape[1])
+        y0, x0 = divmod(int(peak), self.shape[1])
+        return np.arctan2(y - y0, x - x0)
 
     @property
     def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, Place | None]:
@@ -106,8 +121,7 @@ class View:
 
     def scales(self, stack: Stack) -> np.ndarray | None:
         """Thickness of each layer in this image over that of the material, the base last, or None where all are 1."""
-        scale = [self.reference.thickness_scale.get(layer.name, 1.0) for layer in (*stack.layers, stack.base)]
-        return None if all(s == 1.0 for s in scale) else np.array(scale, np.float32)
+        return layer_scales(self.reference.thickness_scale, stack)
 
     def samples(self, which: np.ndarray | None = None, quadrature: int = QUADRATURE, seed: int = 0) -> Samples:
         """Samples of all usable pixels, or of some."""
@@ -134,10 +148,10 @@ class View:
         return Place(uv, np.linalg.norm(away, axis=-1).astype(np.float32), sky.astype(np.float32))
 
 
-def load(scene: Scene, min_cosine: float | None = None) -> list[View]:
-    """Read every reference of a scene, down to its own least cosine or another. Raises `InputError` for one that cannot be fitted."""
-    least = scene.fit.min_cosine if min_cosine is None else min_cosine
-    return [load_reference(reference, least) for reference in scene.references]
+def layer_scales(scales: Mapping[str, float], stack: Stack) -> np.ndarray | None:
+    """Scale of the thickness of each layer of a material, the base last, or None where all are 1."""
+    scale = [scales.get(layer.name, 1.0) for layer in (*stack.layers, stack.base)]
+    return None if all(s == 1.0 for s in scale) else np.array(scale, np.float32)
 
 
 def load_reference(reference: Reference, min_cosine: float) -> View:

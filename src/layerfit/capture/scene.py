@@ -99,6 +99,34 @@ class Reference:
     thickness_scale: Mapping[str, float]
     """Thickness of a coat in this image over that of the material, by layer name."""
 
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.exr
+
+
+@dataclasses.dataclass(frozen=True)
+class MeasuredReference:
+    """A measured BRDF: it needs no camera and no lights."""
+
+    brdf: Path
+    illuminant: str
+    """Light in which spectra become colours."""
+    min_half_deg: float
+    """Samples whose half vector is nearer to the normal are not used: the spike of a mirror, which an instrument blurs."""
+    thickness_scale: Mapping[str, float]
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.brdf
+
+
+METRICS = ("law", "uniform", "relative", "log", "cube_root")
+"""In what differences are taken; `fit.difference` and `fit.weights` say how."""
+
+LOSSES = ("square", "huber", "cauchy")
+
 
 @dataclasses.dataclass(frozen=True)
 class FitRequest:
@@ -108,7 +136,7 @@ class FitRequest:
     fixed: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     loss: str = "square"
     min_cosine: float = 0.1
-    weights: str = "law"
+    metric: str = "law"
     starts: int = 8
     seed: int = 0
 
@@ -118,7 +146,7 @@ class Scene:
     """A scene file, read and checked."""
 
     path: Path
-    references: tuple[Reference, ...]
+    references: tuple[Reference | MeasuredReference, ...]
     start: Stack
     fit: FitRequest
 
@@ -131,7 +159,7 @@ def read_scene(path: str | Path) -> Scene:
     check_keys(document, ("reference", "geometry", "camera", "light", "material", "fit"), where)
     entries = document.get("reference")
     if entries is None:
-        raise InputError(f'{where}: there is no [reference]; give one, with exr = "NAME.exr"')
+        raise InputError(f'{where}: there is no [reference]; give one, with exr = "NAME.exr" or brdf = "NAME.bsdf"')
     entries = entries if isinstance(entries, list) else [entries]
     return Scene(
         path,
@@ -144,10 +172,12 @@ def read_scene(path: str | Path) -> Scene:
 _CHANNEL_KEYS = ("beauty", "alpha", "normal", "position", "tangent", "uv", "depth", "noise")
 
 
-def _references(entry: Any, document: Mapping[str, Any], path: Path, where: str) -> list[Reference]:
-    check_keys(entry, ("exr", *_CHANNEL_KEYS, "mask", "camera", "light", "geometry", "thickness_scale"), where)
+def _references(entry: Any, document: Mapping[str, Any], path: Path, where: str) -> list[Reference] | list[MeasuredReference]:
+    if isinstance(entry, Mapping) and "brdf" in entry:
+        return _measured(entry, path, where)
+    check_keys(entry, ("exr", "brdf", *_CHANNEL_KEYS, "mask", "camera", "light", "geometry", "thickness_scale"), where)
     if "exr" not in entry:
-        raise InputError(f"{where}: there is no exr; name the reference render")
+        raise InputError(f"{where}: there is no exr; name the reference render, or a measured brdf")
     names = entry["exr"] if isinstance(entry["exr"], list) else [entry["exr"]]
     camera = entry.get("camera", document.get("camera"))
     lights = entry.get("light", document.get("light"))
@@ -157,8 +187,7 @@ def _references(entry: Any, document: Mapping[str, Any], path: Path, where: str)
     if not lights:
         raise InputError(f'{path}: there is no [[light]]; give at least one, for example type = "directional"')
     channels = {key: _text(entry[key], f"{where}.{key}") for key in _CHANNEL_KEYS if key in entry}
-    scale = entry.get("thickness_scale", {})
-    check = {str(k): _positive(v, f"{where}.thickness_scale.{k}") for k, v in dict(scale).items()}
+    scale = _thickness_scale(entry, where)
     lights = lights if isinstance(lights, list) else [lights]
     return [
         Reference(
@@ -168,10 +197,26 @@ def _references(entry: Any, document: Mapping[str, Any], path: Path, where: str)
             geometry=None if geometry is None else _geometry(geometry, f"{path}: geometry"),
             channels=channels,
             mask=path.parent / _text(entry["mask"], f"{where}.mask") if "mask" in entry else None,
-            thickness_scale=check,
+            thickness_scale=scale,
         )
         for name in names
     ]
+
+
+def _measured(entry: Mapping[str, Any], path: Path, where: str) -> list[MeasuredReference]:
+    check_keys(entry, ("brdf", "illuminant", "min_half_deg", "thickness_scale"), where)
+    names = entry["brdf"] if isinstance(entry["brdf"], list) else [entry["brdf"]]
+    least = _finite(entry.get("min_half_deg", 0.0), f"{where}.min_half_deg")
+    if not 0.0 <= least < 90.0:
+        raise InputError(f"{where}.min_half_deg = {least:g}: should be from 0 to below 90 degrees")
+    illuminant = _text(entry.get("illuminant", "D65"), f"{where}.illuminant")
+    scale = _thickness_scale(entry, where)
+    return [MeasuredReference(path.parent / _text(name, f"{where}.brdf"), illuminant, least, scale) for name in names]
+
+
+def _thickness_scale(entry: Mapping[str, Any], where: str) -> dict[str, float]:
+    scale = entry.get("thickness_scale", {})
+    return {str(k): _positive(v, f"{where}.thickness_scale.{k}") for k, v in dict(scale).items()}
 
 
 def _start(material: Any, path: Path) -> Stack:
@@ -190,13 +235,17 @@ def _start(material: Any, path: Path) -> Stack:
 
 
 def _fit(table: Any, where: str) -> FitRequest:
-    check_keys(table, [f.name for f in dataclasses.fields(FitRequest)], where)
+    check_keys(table, [*(f.name for f in dataclasses.fields(FitRequest)), "weights"], where)
     values = dict(table)
+    if "weights" in values:  # what `metric` was called when there were two of them
+        if "metric" in values:
+            raise InputError(f"{where}: weights is a former name of metric; give metric alone")
+        values["metric"] = values.pop("weights")
     if "free" in values:
         if not isinstance(values["free"], list) or not all(isinstance(v, str) for v in values["free"]):
             raise InputError(f'{where}.free: should be a list of parameters such as "coat.alpha"')
         values["free"] = tuple(values["free"])
-    for key, known in (("loss", ("square", "huber", "cauchy")), ("weights", ("law", "uniform"))):
+    for key, known in (("loss", LOSSES), ("metric", METRICS)):
         if values.get(key, known[0]) not in known:
             raise InputError(
                 f"{where}.{key} = {values[key]!r}: should be one of {', '.join(known)}{nearest(str(values[key]), known)}"

@@ -30,6 +30,8 @@ class Block:
     """(layers,): thickness over that of the material; absent where it is 1 everywhere."""
     place: Place | None = None
     """Where the pixels are on the surface; absent where the material is the same everywhere, or is fitted by its mean."""
+    curve: Any = None
+    """What model and target are brought to before they are compared; absent where their values are."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,16 +11,20 @@ import numpy as np
 from .. import render
 from .._compiled import CLOCK
 from .._place import narrowed
-from ..capture.samples import QUADRATURE, Samples, View
+from ..capture.load import AnyView
+from ..capture.samples import QUADRATURE, Samples
+from ..capture.scene import METRICS
+from ..documents import nearest
 from ..errors import InputError
 from ..stack import Stack
 from .blocks import Block, arrange, channels_first
+from .difference import Curve, compared, curve
 from .parameters import Parametrisation, parametrise, with_fixed
 from .residuals import NEAR, begin, depths, initial, parts, scaled, step
 from .result import FitResult, Held, Minimum, Row
 from .solve import NormalLevenbergMarquardt
 from .uncertainty import GROUPS, estimate
-from .weights import inverse_sigma, misfit, robust
+from .weights import brightness, inverse_sigma, misfit, robust
 
 PIXELS = 65536
 """Pixels that a fit uses at most, all references together: more of them do not change the answer by what it can be wrong by."""
@@ -41,12 +45,12 @@ ROUNDS = 3
 
 
 def fit(
-    views: Sequence[View],
+    views: Sequence[AnyView],
     start: Stack,
     *,
     free: Sequence[str] | None = None,
     fixed: dict[str, Any] | None = None,
-    weights: str = "law",
+    metric: str = "law",
     loss: str = "square",
     starts: int = 8,
     seed: int = 0,
@@ -55,16 +59,18 @@ def fit(
 ) -> FitResult:
     """Fit the free parameters of `start` to the references.
 
-    `free` are names such as "coat.alpha" (left out: what an image can tell), `fixed` are values by name. `weights` is "law" or "uniform"
-    (see `weights`), `loss` "square", "huber" or "cauchy". `starts` space-filling starts are tried beside the given one, all
-    coarsely on few pixels, the best of them to the end. Raises `InputError` for what cannot be fitted.
+    `free` are names such as "coat.alpha" (left out: what an image can tell), `fixed` are values by name. `metric` is "law", "uniform",
+    "relative", "log" or "cube_root" (see `difference`), `loss` "square", "huber" or "cauchy". `starts` space-filling starts are tried beside
+    the given one, all coarsely on few pixels, the best of them to the end. Raises `InputError` for what cannot be fitted.
     """
+    if metric not in METRICS:
+        raise InputError(f"{where}.metric = {metric!r}: should be one of {', '.join(METRICS)}{nearest(metric, METRICS)}")
     with jax.enable_x64(True):
-        return _Fit(views, start, free, fixed or {}, weights, loss, starts, seed, where, progress).run()
+        return _Fit(views, start, free, fixed or {}, metric, loss, starts, seed, where, progress).run()
 
 
 class _Fit:
-    def __init__(self, views, start, free, fixed, weights, loss, starts, seed, where, progress):
+    def __init__(self, views, start, free, fixed, metric, loss, starts, seed, where, progress):
         start = with_fixed(start, fixed, f"{where}.fixed")
         free, self.held = _without_gauge(start, free, views)
         start, self.free = parametrise(start, free, tuple(fixed), where)
@@ -73,13 +79,15 @@ class _Fit:
         self.start = start.astype(np.float32)
         for view in views:
             view.check(start)
-        self.views, self.weights, self.loss, self.starts, self.seed, self.where = views, weights, loss, starts, seed, where
+        self.views, self.metric, self.loss, self.starts, self.seed, self.where = views, metric, loss, starts, seed, where
         self.progress = progress
         self.trace: list[Row] = []
         self.clock = dataclasses.replace(CLOCK)
         self.began = time.perf_counter()
         self.samples = [view.samples(_chosen(view, len(views), seed), DIRECTIONS, seed) for view in views]
-        self.blocks, self.layout = arrange(self.samples, _scales(views, start), seed, start.needs)
+        blocks, self.layout = arrange(self.samples, _scales(views, start), seed, start.needs)
+        self.curves = [curve(metric, brightness(s.target)) for s in self.samples]
+        self.blocks = [_compared_by(self.curves[of[0]], block) for of, block in zip(self.layout.reference, blocks, strict=True)]
         self.solver = NormalLevenbergMarquardt()
         self._set_bounds()
 
@@ -122,7 +130,7 @@ class _Fit:
             notes=self.notes,
             trace=self.trace,
             models=models,
-            misfit=misfit(models, self.samples, self._weights(models)),
+            misfit=misfit(models, self.samples, self._weights(models, "law")),
             samples=self.samples,
             views=self.views,
             clock=clock,
@@ -134,22 +142,24 @@ class _Fit:
 
     def _weigh(self, u: np.ndarray | None) -> None:
         """Set the residual weights from the model at `u`, or equal ones before there is a model."""
-        even = [inverse_sigma(s.target, s.target, None, "uniform") for s in self.samples]
-        values = even if u is None else self._weights(self._models(u))
+        first = "uniform" if self.curves[0] is None else self.metric
+        even = [inverse_sigma(s.target, s.target, None, first) for s in self.samples]
+        values = even if u is None else self._weights(self._models(u), self.metric)
         weight = channels_first(self.layout.scatter(values, 0.0))
         self.brightness = [
-            float(np.sum((w * np.asarray(block.target)).astype(float) ** 2))
+            float(np.sum((w * compared(block.target, block.curve)).astype(float) ** 2))
             for w, block in zip(weight, self.blocks, strict=True)
         ]
         self.blocks = [_weighted(block, w) for block, w in zip(self.blocks, weight, strict=True)]
 
-    def _weights(self, models: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def _weights(self, models: Sequence[np.ndarray], metric: str) -> list[np.ndarray]:
         """Weights of the residuals of these models, a reference each."""
         values = []
         for model, samples in zip(models, self.samples, strict=True):
-            weight = inverse_sigma(model, samples.target, samples.noise, self.weights)
-            weight = weight * robust((model - samples.target) * weight, self.loss)
-            values.append(weight)
+            weight = inverse_sigma(model, samples.target, samples.noise, metric)
+            by = curve(metric, brightness(samples.target))
+            difference = compared(model, by) - compared(samples.target, by)
+            values.append(weight * robust(difference * weight, self.loss))
         return values
 
     def _models(self, u: np.ndarray) -> list[np.ndarray]:
@@ -236,11 +246,18 @@ def _have_no_effect(names: Sequence[str]) -> str:
     return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no effect on this image"
 
 
+def _compared_by(by: Curve | None, block: Block) -> Block:
+    """A block that is compared in other values than its own; they stand beside channels that come first."""
+    return block if by is None else dataclasses.replace(block, curve=jax.device_put(jax.tree.map(lambda a: a[:, None], by)))
+
+
 def _weighted(block: Block, inverse_sigma: np.ndarray) -> Block:
     return dataclasses.replace(block, inverse_sigma=jax.device_put(inverse_sigma))
 
 
-def _without_gauge(start: Stack, free: Sequence[str] | None, views: Sequence[View]) -> tuple[Sequence[str] | None, list[Held]]:
+def _without_gauge(
+    start: Stack, free: Sequence[str] | None, views: Sequence[AnyView]
+) -> tuple[Sequence[str] | None, list[Held]]:
     """Hold one of two fields that enter only together, such as the thickness of a coat whose absorption is fitted too.
 
     What a base does with light is another matter at another thickness: there the images tell.
@@ -256,7 +273,7 @@ def _without_gauge(start: Stack, free: Sequence[str] | None, views: Sequence[Vie
     return free, held
 
 
-def _chosen(view: View, views: int, seed: int) -> np.ndarray:
+def _chosen(view: AnyView, views: int, seed: int) -> np.ndarray:
     """Pixels of a reference that the fit uses: all, or as many as it can afford, at random."""
     most = max(128, (PIXELS if view.exact else EVALUATIONS // DIRECTIONS) // views)
     total = len(view.index)
@@ -266,24 +283,18 @@ def _chosen(view: View, views: int, seed: int) -> np.ndarray:
 
 
 def _sectors(samples: Samples, count: int) -> np.ndarray:
-    """Sector of each pixel by its angle around the smallest half angle in the image."""
-    wi = samples.wi[np.arange(len(samples.index)), np.argmax(samples.weight.sum(-1), 1)]
-    h = wi + samples.wo
-    peak = samples.index[np.argmin(np.hypot(h[:, 0], h[:, 1]) / np.maximum(h[:, 2], 1e-6))]
-    y, x = np.divmod(samples.index, samples.shape[1])
-    y0, x0 = divmod(int(peak), samples.shape[1])
-    turn = np.arctan2(y - y0, x - x0) / (2.0 * np.pi) + 0.5
-    rank = np.argsort(np.argsort(turn))  # equal numbers of pixels, however the highlight lies
+    """Sector of each pixel, of equal numbers of pixels, however the highlight lies."""
+    rank = np.argsort(np.argsort(samples.turn))
     return (rank * count // len(rank)).astype(np.float32)
 
 
-def _scales(views: Sequence[View], start: Stack) -> np.ndarray | None:
+def _scales(views: Sequence[AnyView], start: Stack) -> np.ndarray | None:
     names = [layer.name for layer in start.layers] + ([start.base.name] if depths(start.base) else [])
     for view in views:
         for name in view.reference.thickness_scale:
             if name not in names:
                 raise InputError(
-                    f"{view.reference.exr}: thickness_scale names {name!r}; layers with a thickness are {', '.join(names) or 'none'}"
+                    f"{view.reference.path}: thickness_scale names {name!r}; layers with a thickness are {', '.join(names) or 'none'}"
                 )
     scales = [view.scales(start) for view in views]
     if all(scale is None for scale in scales):

@@ -42,7 +42,9 @@ def _columns(material: tuple[Any, Any], block: Block, *, form: Any) -> Any:
 
     def residual(prepared: Any) -> Any:
         model = shade(prepared, block.wi, block.wo, block.weight, block.place, form=form)
-        return (model - block.target) * block.inverse_sigma
+        if block.curve is None:
+            return (model - block.target) * block.inverse_sigma
+        return (block.curve(model) - block.curve(block.target)) * block.inverse_sigma
 
     return columns(residual, *material)
 

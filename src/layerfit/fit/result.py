@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from .._compiled import Clock
-from ..capture.samples import Samples, View
+from ..capture.load import AnyView
+from ..capture.samples import Samples
 from ..preset import left_out, rounded
 from ..stack import Stack
 from . import words
@@ -80,7 +81,7 @@ class FitResult:
     misfit: float
     """Weighted residual over the weighted image, without the noise that the files state."""
     samples: list[Samples]
-    views: Sequence[View]
+    views: Sequence[AnyView]
     clock: Clock
     solve_s: float
 

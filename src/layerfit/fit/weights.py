@@ -25,12 +25,25 @@ FIREFLY = 8.0
 """Scatters (1.48 median absolute residuals) from which on a residual is called a firefly."""
 
 
-def inverse_sigma(model: np.ndarray, target: np.ndarray, noise: np.ndarray | None, kind: str) -> np.ndarray:
-    """Weight of each residual, (pixels, 3), from the model's values there. `kind` is "law" or "uniform"."""
-    bright = np.maximum(np.quantile(target, 0.98, axis=0), 1e-12 + 1e-3 * np.quantile(target, 0.98))
-    if kind == "uniform":
+RELATIVE_FLOOR = 1e-3
+"""Part of the same percentile at which the relative metric turns absolute."""
+
+
+def brightness(target: np.ndarray) -> np.ndarray:
+    """(3,) 98th percentile of each channel of a reference (pixels, 3), never 0."""
+    return np.maximum(np.quantile(target, 0.98, axis=0), 1e-12 + 1e-3 * np.quantile(target, 0.98))
+
+
+def inverse_sigma(model: np.ndarray, target: np.ndarray, noise: np.ndarray | None, metric: str) -> np.ndarray:
+    """Weight of each residual, (pixels, 3), from the model's values there; `metric` is one of `difference.METRICS`."""
+    bright = brightness(target)
+    if metric in ("log", "cube_root"):
+        return np.ones(target.shape, np.float32)
+    if metric == "uniform":
         return np.broadcast_to(1.0 / bright, target.shape).astype(np.float32)
     model = np.maximum(model, 0.0)
+    if metric == "relative":
+        return (1.0 / (model + RELATIVE_FLOOR * bright)).astype(np.float32)
     variance = (MODEL_SHARE * model) ** 2 + (FLOOR_SHARE * bright) ** 2
     if noise is not None:
         variance = variance + noise_law(model, noise) ** 2

@@ -56,6 +56,11 @@ def resample(wavelength_nm: Any, values: Any, where: str = "spectrum") -> np.nda
     return np.interp(WAVELENGTHS_NM, wavelength_nm, values)
 
 
+def resampling(wavelength_nm: np.ndarray) -> np.ndarray:
+    """Matrix (n, 81) that takes many spectra (m, n) at rising wavelengths (n,) to `WAVELENGTHS_NM`: `spectra @ resampling(...)`."""
+    return np.stack([np.interp(WAVELENGTHS_NM, wavelength_nm, one) for one in np.eye(len(wavelength_nm))])
+
+
 @functools.cache
 def rgb_weights(illuminant: str = "D65") -> np.ndarray:
     """Weights (81, 3): `spectrum @ rgb_weights()` is the linear Rec.709 colour of a reflectance or transmittance in this light.

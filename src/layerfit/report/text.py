@@ -22,7 +22,7 @@ def lines(document: Mapping[str, Any]) -> list[str]:
             "flags": ", ".join(d["flags"]) or "none",
             "error": image_error(d["error"]),
             "pixels": f"{_pixels(pixels)}{_dropped(pixels['dropped'])}",
-            "weights": _weights(d["weighting"]),
+            "metric": _weights(d["weighting"]),
             "light": _light(d["quadrature"]),
             "starts": f"{d['starts']}, of which {_same_minimum(d['minima'])} reached this minimum",
         }
@@ -96,16 +96,25 @@ def _pixels(pixels: Mapping[str, Any]) -> str:
     return f"{used} used" if used == usable else f"{used} used, drawn at random from {usable} that can be compared"
 
 
+METRICS = {
+    "uniform": "values, the same for every pixel: for a measured BRDF the cosine-weighted L2",
+    "relative": "values over those of the model",
+    "log": "logarithms of values",
+    "cube_root": "cube roots of values",
+}
+"""What is compared, in words; by the law there is more to say."""
+
+
 def _weights(weighting: Mapping[str, Any]) -> str:
     loss = "" if weighting["loss"] == "square" else f"; {weighting['loss']} loss"
-    if weighting["kind"] == "uniform":
-        return f"the same for every pixel{loss}"
+    if weighting["kind"] in METRICS:
+        return f"{METRICS[weighting['kind']]}{loss}"
     noise = weighting["noise"]
     known = "the noise that the file states" if all(noise) else "the noise of the files that state it"
     of_model, of_white = 100.0 * weighting["model_share"], 100.0 * weighting["floor_share"]
     misfit = f"{of_model:g} % of the value, {of_white:g} % of the image's brightness"
     misfit += f" and {known}" if any(noise) else "; no file states its noise"
-    return f"1 / (expected misfit)^2, from {misfit}{loss}"
+    return f"law, 1 / (expected misfit)^2, from {misfit}{loss}"
 
 
 def _light(quadrature: Mapping[str, Any] | None) -> str:
