@@ -112,13 +112,14 @@ def test_growth_is_finite_at_its_edges(dtype):
 
 METAL = Conductor(alpha=0.2, **COPPER)
 CRUST = {"absorbed": [0.8, 0.2, 0.4], "scattered": [0.5, 1.0, 0.8]}
-ONCE = {"albedo": [0.3, 0.6, 0.5], "depth": 0.8, "g": 0.2}
+SCATTERS = {"albedo": [0.3, 0.6, 0.5], "depth": 0.8, "g": 0.2}
 PATINAS = {
-    "all": Stack((Patina(softness=0.05, tau=[0.5, 1.0, 2.0], weight=0.6, **ONCE, **CRUST),), METAL),
+    "all": Stack((Patina(softness=0.05, tau=[0.5, 1.0, 2.0], weight=0.6, **SCATTERS, **CRUST),), METAL),
     "film with a hard edge": Stack((Patina(absorption_per_mm=[300.0, 900.0, 2000.0], thickness_um=1.0),), METAL),
     "crust": Stack((Patina(softness=0.1, eta=1.7, **CRUST),), METAL),
     "trapped light": Stack((Patina(softness=0.1, tau=0.3),), METAL, Corrected(trapped=True)),
-    "faithful": Stack((Patina(softness=0.1, tau=0.3, masking="vcavity", **ONCE),), METAL, Faithful()),
+    "as published": Stack((Patina(softness=0.1, tau=0.3, mixing="added", **SCATTERS, **CRUST),), METAL),
+    "faithful": Stack((Patina(softness=0.1, tau=0.3, masking="vcavity", mixing="added", **SCATTERS),), METAL, Faithful()),
     "exposed": Stack((Patina(softness=0.05, exposure=0.7, tau=[0.5, 1.0, 2.0], **CRUST),), METAL),
     "exposed, with a hard edge": Stack((Patina(exposure=1.0, tau=0.3),), METAL),
 }
@@ -139,7 +140,7 @@ def test_a_patina_has_its_digits(oracle, dtype):
         same = ("alpha", "alpha_x", "alpha_y", "eta", "tau", "distribution", "masking")
         scattering = {"albedo": i["albedo"], "depth": i["tau_s"], "g": i["g"]}
         crust = {"absorbed": i["K"] * i["x"], "scattered": i["S"] * i["x"]}
-        layer = Patina(**{field: getattr(film, field) for field in same}, **scattering, **crust)
+        layer = Patina(**{field: getattr(film, field) for field in same}, **scattering, **crust, mixing="added")
         covered = np.float32(i["m"]) if dtype == np.float32 else i["m"]
         stack = Stack((layer,), surface_of(i["base"]), Corrected(trapped=True)).astype(dtype)
         value = float(_at_spot(stack, covered, i["wi"], i["wo"], dtype))
@@ -207,6 +208,19 @@ def test_what_is_covered_for_long_is_film_and_crust_alone(rows):
     old = Stack((layer,), METAL).astype(np.float64)
     coat = Coat(alpha=0.3, eta=2.7, tau=np.sqrt(1e4 - 1.0) * np.array([0.002, 0.004, 0.008]))
     np.testing.assert_allclose(brdf(old, wi, wo, place), brdf_rows(Stack((coat,), METAL).astype(np.float64), wi, wo), rtol=2e-4)
+
+
+@pytest.mark.parametrize("g", [None, 0.6])
+def test_a_film_that_scatters_is_a_coat_that_does(g, rows):
+    """But for the fewer nodes of its quadrature, which is of every place."""
+    wi, wo, place = rows
+    thin = Patina(years=1e4, onset_years=1.0, blur=1e-3, tau=0.002, albedo=[0.3, 0.6, 0.9], depth=0.02, g=g)
+    h, albedo = np.sqrt(1e4 - 1.0), np.array([0.3, 0.6, 0.9])
+    coat = Coat(alpha=0.3, eta=2.7, tau=h * (0.002 + (1.0 - albedo) * 0.02), tau_s=h * albedo * 0.02, g=g)
+    values, wanted = (
+        brdf(Stack((layer,), METAL).astype(np.float64), wi, wo, place) for layer, place in ((thin, place), (coat, None))
+    )
+    np.testing.assert_allclose(values, wanted, rtol=2e-3)
 
 
 def test_the_mean_over_the_surface_is_near_the_mean_of_its_places():
@@ -337,7 +351,16 @@ def test_a_patina_is_written_and_read():
 @pytest.mark.parametrize(
     ("document", "message"),
     [
-        ({"layers": [{"type": "patina", "albedo": 0.5}], "base": {"type": "conductor"}}, "come together; depth, g is missing"),
+        ({"layers": [{"type": "patina", "albedo": 0.5}], "base": {"type": "conductor"}}, "come together; depth is missing"),
+        ({"layers": [{"type": "patina", "g": 0.5}], "base": {"type": "conductor"}}, "g belongs to albedo"),
+        (
+            {
+                "model": "faithful",
+                "layers": [{"type": "patina", "albedo": 0.5, "depth": 0.3}],
+                "base": {"type": "conductor"},
+            },
+            'patina scatters light in its film, which this form does not know: give it mixing = "added"',
+        ),
         ({"layers": [{"type": "patina"}], "base": {"type": "lambert"}}, "alone over a conductor; here its base is Lambert"),
         ({"layers": [{"type": "coat"}, {"type": "patina"}], "base": {"type": "conductor"}}, "one of several layers"),
         ({"model": "precise", "layers": [{"type": "patina"}], "base": {"type": "conductor"}}, "it changes in time"),

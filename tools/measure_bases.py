@@ -57,7 +57,8 @@ PATINAS = {
     "patina, film": Patina(**FILM),
     "patina, film and scattering, albedo .2": Patina(**FILM, **ONCE, albedo=0.2),
     "patina, film and scattering, albedo .6": Patina(**FILM, **ONCE, albedo=0.6),
-    "patina, the same, its depth in tau too": Patina(**FILM | {"tau": [0.35, 0.6, 1.1]}, **ONCE, albedo=0.6),
+    "patina, the same, light scattered once added": Patina(**FILM, **ONCE, albedo=0.6, mixing="added"),
+    "patina, film and scattering forwards": Patina(**FILM, depth=1.0, g=0.6, albedo=0.9),
 }
 
 
@@ -92,11 +93,11 @@ def patina_below(stack: Stack, coated: Stack, at: Fan) -> np.ndarray:
 
 
 def medium(patina: Patina) -> tuple[Coat, dict[str, Haze]]:
-    """Film and scattering of a patina as one medium: what is met in the slab is scattered by its albedo, and absorbed else."""
-    if patina.albedo is None:
-        return patina.film, {}
-    tau = np.asarray(FILM["tau"]) + (1.0 - patina.albedo) * patina.depth
-    return dataclasses.replace(patina.film, tau=tau), {patina.name: Haze(patina.albedo * patina.depth, patina.g)}
+    """Film and scattering of a patina as the walk knows them."""
+    coat = dataclasses.replace(patina, mixing="medium").film
+    if coat.tau_s is None:
+        return coat, {}
+    return dataclasses.replace(coat, tau_s=None, g=None), {patina.name: Haze(coat.tau_s, coat.g)}
 
 
 def report(name: str, errors: list[float]) -> None:

@@ -12,6 +12,7 @@ struct Coat {
     float alpha;  // width of the facet slopes; the square of an artist's roughness
     float eta;    // index of refraction, against air
     vec3 tau;     // optical depth, one way at normal incidence
+    vec3 tau_s;   // optical depth of scattering, beside that of absorption
 };
 
 struct Interface {
@@ -40,9 +41,6 @@ struct Growth {
 
 struct Crust {
     float blur;       // time in which growth sets in, in onset times
-    vec3 albedo;      // part that scatters, of the light that is met
-    float depth;      // optical depth of what scatters once
-    float g;          // mean cosine of scattering once
     vec3 absorbed;    // absorption of the crust, K times its thickness
     float scattered;  // scattering of the crust, S times its thickness
 };
@@ -50,6 +48,13 @@ struct Crust {
 struct Cover {
     float covered;  // part that is covered
     float bare;     // part that is not: 1 - covered, without the cancellation
+};
+
+struct Fluence {
+    vec3 upper;   // in the upper third
+    vec3 middle;  // in the middle third
+    vec3 lower;   // in the lower third
+    vec3 base;    // flux on the base
 };
 
 struct Crossing {
@@ -60,15 +65,26 @@ struct Crossing {
     float drift;        // the part of it due to grazing incidence
 };
 
+struct Haze {
+    vec3 reduced;        // optical depth, with light scattered forwards taken as not scattered
+    vec3 upper_upper;    // light that goes on to and fro and stays within the upper third
+    vec3 upper_middle;   // that goes from the upper to the middle third, or back
+    vec3 upper_lower;    // from the upper to the lower third, or back
+    vec3 middle_middle;  // within the middle third
+    vec3 middle_lower;   // from the middle to the lower third, or back
+    vec3 lower_lower;    // within the lower third
+};
+
 struct TwoFlux {
     vec3 R;  // part that it sends back
     vec3 T;  // part that it lets through
 };
 
 const Coat lf_patina_coat = Coat(
-    0.5,                             // alpha: width of the facet slopes; the square of an artist's roughness
-    2.7,                             // eta: index of refraction, against air
-    vec3(0.5985, 3.543, 12.160501)   // tau: optical depth, one way at normal incidence
+    0.5,                               // alpha: width of the facet slopes; the square of an artist's roughness
+    2.7,                               // eta: index of refraction, against air
+    vec3(0.8385, 3.6629999, 12.3105),  // tau: optical depth, one way at normal incidence
+    vec3(0.060000002, 0.18, 0.15)      // tau_s: optical depth of scattering, beside that of absorption
 );
 
 const Interface lf_patina_interface = Interface(
@@ -103,12 +119,13 @@ const Growth lf_patina_growth = Growth(
 
 const Crust lf_patina_crust = Crust(
     0.05,                   // blur: time in which growth sets in, in onset times
-    vec3(0.2, 0.6, 0.5),    // albedo: part that scatters, of the light that is met
-    0.3,                    // depth: optical depth of what scatters once
-    0.0,                    // g: mean cosine of scattering once
     vec3(2.2, 0.28, 0.45),  // absorbed: absorption of the crust, K times its thickness
     0.7                     // scattered: scattering of the crust, S times its thickness
 );
+
+const float lf_row1[6] = float[6](0.03376524, 0.16939531, 0.3806904, 0.6193096, 0.8306047, 0.96623474);
+
+const float lf_row2[6] = float[6](0.085662246, 0.18038079, 0.23395696, 0.23395696, 0.18038079, 0.085662246);
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
@@ -219,6 +236,61 @@ float lf_thickness_at(float g, Growth growth, float blur) {
     return lf_tarnish_thickness(growth.age, t_on, 1.0, blur);
 }
 
+// Cosine between a direction and the facets that it meets.
+float lf_facet_cosine(vec3 w, float tilt) {
+    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
+float lf_transmittance_dielectric(float c, float eta) {
+    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float eta2 = eta * eta;
+    float perpendicular = c + g;
+    float parallel = eta2 * c + g;
+    float product = 2.0 * c * g;
+    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
+    return eta == 1.0 ? 1.0 : passed;
+}
+
+// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
+float lf_with_second_facet(float T, float gain) {
+    return T + (1.0 - T) * gain;
+}
+
+// (1 - exp(-x)) / x for x >= 0: mean of exp(-x t) over t in [0, 1].
+vec3 lf_mean_transmittance(vec3 x) {
+    bvec3 thin = lessThan(x, vec3(0.01));
+    vec3 safe = mix(x, vec3(1.0), thin);
+    return mix(-lf_expm1(-safe) / safe, 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))), thin);
+}
+
+// A beam on its way down a medium of depth tau: mean fluence in its thirds, and what comes to the base.
+Fluence lf_fluence(vec3 tau, float path) {
+    vec3 third = tau * path / 3.0;
+    vec3 T = exp(-third);
+    vec3 first = path * lf_mean_transmittance(third);
+    vec3 second = first * T;
+    return Fluence(first, second, second * T, T * T * T);
+}
+
+// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
+vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
+    float c2 = c * c;
+    float s2 = (1.0 - c) * (1.0 + c);
+    vec3 p = (eta - k) * (eta + k) - s2;
+    vec3 nk = eta * k;
+    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
+    vec3 larger = sqrt(0.5 * (q + abs(p)));
+    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 twice_ac = 2.0 * a * c;
+    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
+    float s4 = s2 * s2;
+    vec3 even = q * c2 + s4;
+    vec3 odd = twice_ac * s2;
+    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
+    return 0.5 * (rs + rp);
+}
+
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
@@ -261,27 +333,6 @@ float lf_ggx_projection(vec3 w, float alpha) {
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
-}
-
-// Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
-}
-
-// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
-float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
-    float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
-}
-
-// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
-float lf_with_second_facet(float T, float gain) {
-    return T + (1.0 - T) * gain;
 }
 
 // Path added near grazing angles, where the facets that face the light take most of it.
@@ -327,61 +378,46 @@ vec3 lf_steer(vec3 w, float lengthening) {
     return vec3(w.x * ratio, w.y * ratio, z);
 }
 
-// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
-vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
-    float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
-    vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
-    vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
-}
-
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
     float m = 0.5 * (1.0 - sine) / max(n * cosine, 1e-14);
     return n > 1.0 ? 0.5 - 0.5 * m / max(sqrt(max(alpha * alpha + m * m, 0.0)), 1e-14) : 0.0;
 }
 
-// Phase function [1/sr] of mean cosine g (Henyey and Greenstein 1941, eq. 2); `deflection` is 1 - cos of the turn, 0 to 2.
-float lf_henyey_greenstein(float deflection, float g) {
-    float a = g < 0.0 ? (-g) : g;
-    float spread = (1.0 - a) * (1.0 - a) + 2.0 * a * (g < 0.0 ? 2.0 - deflection : deflection);
-    return (1.0 - a) * (1.0 + a) / (12.566371 * (spread * sqrt(spread)));
-}
-
-// (1 - exp(-x)) / x for x >= 0: mean of exp(-x t) over t in [0, 1].
-float lf_mean_transmittance(float x) {
-    bool thin = x < 0.01;
-    float safe = thin ? 1.0 : x;
-    return thin ? 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))) : -lf_expm1(-safe) / safe;
-}
-
 // The same by the depth of scattering within `tau`, and paths in thicknesses: 1 / cos, or longer below a rough boundary.
-vec3 lf_once_back(float phase, vec3 tau_s, float tau, float path_i, float path_o) {
+vec3 lf_once_back(float phase, vec3 tau_s, vec3 tau, float path_i, float path_o) {
     return tau_s * (phase * path_i * path_o) * lf_mean_transmittance(tau * (path_i + path_o));
 }
 
-// BRDF [1/sr] of light that a slab scatters once, and back, without a boundary (Hanrahan and Krueger 1993).
-vec3 lf_scattered_back(float phase, vec3 albedo, float tau, float cos_i, float cos_o) {
-    return lf_once_back(phase, albedo * tau, tau, 1.0 / max(cos_i, 1e-08), 1.0 / max(cos_o, 1e-08));
+// The same for light that goes on to the other side.
+vec3 lf_once_through(float phase, vec3 tau_s, vec3 tau, float path_i, float path_t) {
+    vec3 a = tau * path_i;
+    vec3 b = tau * path_t;
+    return tau_s * (phase * path_i * path_t) * exp(-min(a, b)) * lf_mean_transmittance(abs(b - a));
 }
 
-// BRDF [1/sr] of light that is scattered once below a smooth boundary (Hanrahan and Krueger 1993).
-vec3 lf_scattered_once(vec3 wi, vec3 wo, float eta, vec3 albedo, float depth, float g) {
-    float T = lf_transmittance_dielectric(wi.z, eta) * lf_transmittance_dielectric(wo.z, eta);
-    wi = lf_refract_about_normal(wi, eta);
-    wo = lf_refract_about_normal(wo, eta);
-    float phase = lf_henyey_greenstein(1.0 + dot(wi, wo), g);
-    return T / (eta * eta) * lf_scattered_back(phase, albedo, depth, wi.z, wo.z);
+// Light scattered once on its way to or from a mirror, or between the two times that it meets it, by two phase functions.
+vec3 lf_once_by_mirror(float on, float back, vec3 tau_s, vec3 tau, float path_i, float path_o, vec3 up_i, vec3 up_o) {
+    vec3 f = lf_once_through(on, tau_s, tau, path_i, path_o) * (up_i + up_o);
+    return f + lf_once_back(back, tau_s, tau, path_i, path_o) * up_i * up_o;
+}
+
+// The same with what a base of reflectance F sends up again, and the coat's inner side of reflectance R down.
+Fluence lf_mirrored(Fluence down, vec3 F, float R) {
+    vec3 up = F * down.base;
+    vec3 series = 1.0 / max(1.0 - R * up * down.base, 1e-06);
+    vec3 upper = series * (down.upper + up * down.lower);
+    vec3 middle = series * (down.middle + up * down.middle);
+    vec3 lower = series * (down.lower + up * down.upper);
+    return Fluence(upper, middle, lower, series * down.base);
+}
+
+// Light [1/sr] that went from one part of the medium to another before it left.
+vec3 lf_exchanged(Haze haze, Fluence i, Fluence o) {
+    vec3 f = i.upper * (haze.upper_upper * o.upper + haze.upper_middle * o.middle + haze.upper_lower * o.lower);
+    f = f + i.middle * (haze.upper_middle * o.upper + haze.middle_middle * o.middle + haze.middle_lower * o.lower);
+    f = f + i.lower * (haze.upper_lower * o.upper + haze.middle_lower * o.middle + haze.lower_lower * o.lower);
+    return f / 3.1415927;
 }
 
 // A layer that absorbs (Kx >= 0) and scatters (Sx >= 0) diffuse light, over nothing (Kubelka 1948).
@@ -406,7 +442,103 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
     bool lit = wi.z > 0.0 && wo.z > 0.0;
     wi = lit ? wi : vec3(0.0, 0.0, 1.0);
     wo = lit ? wo : vec3(0.0, 0.0, 1.0);
-    vec3 tau = lf_patina_coat.tau * thickness;
+    vec3 t = lf_patina_coat.tau * thickness;
+    vec3 t2 = lf_patina_coat.tau_s * thickness;
+    vec3 t3 = t + t2;
+    vec3 t4 = t2 / 12.0;
+    float t5 = min(lf_patina_interface.n, 1.0);
+    float t6 = t5 / lf_patina_interface.n;
+    vec3 total = vec3(0.0);
+    vec3 total2 = vec3(0.0);
+    vec3 total3 = vec3(0.0);
+    vec3 total4 = vec3(0.0);
+    vec3 total5 = vec3(0.0);
+    vec3 total6 = vec3(0.0);
+    for (int k = 0; k < 6; ++k) {
+        float u2 = lf_row1[k] * lf_row1[k];
+        float u3 = u2 * lf_row1[k];
+        float jacobian = 6.0 * u2 * u3;
+        float p2 = (1.0 - u3) * (1.0 + u3) * t5 * t5;
+        float cosine2 = 1.0 - p2;
+        vec3 w = vec3(sqrt(max(p2, 0.0)), 0.0, sqrt(max(cosine2, 0.0)));
+        float c = lf_patina_coat.eta >= 1.0 ? lf_facet_cosine(w, lf_patina_interface.tilt) : w.z;
+        float T = cosine2 > 0.0 ? lf_with_second_facet(lf_transmittance_dielectric(c, lf_patina_coat.eta), lf_patina_interface.gain) : 0.0;
+        float t7 = t5 * u3;
+        float cosine = sqrt(max(t7 * t7 + (lf_patina_interface.n - t5) * (lf_patina_interface.n + t5), 0.0)) / lf_patina_interface.n;
+        float outside = u3 * sqrt(max(1.0 - t6 * t6, 0.0));
+        t5 = 1.0 - T;
+        float path = 1.0 / max(cosine, 1e-06);
+        Fluence beam = lf_fluence(t3, path);
+        vec3 third = t3 * path / 3.0;
+        bvec3 thin = lessThan(third, vec3(0.1));
+        vec3 safe = mix(third, vec3(1.0), thin);
+        vec3 series = 0.5 - third / 6.0 * (1.0 - third / 4.0 * (1.0 - third / 5.0 * (1.0 - third / 6.0 * (1.0 - third / 7.0))));
+        vec3 own = 2.0 * path * path * mix((1.0 - lf_mean_transmittance(safe)) / safe, series, thin);
+        vec3 t8 = path * lf_mean_transmittance(third);
+        vec3 next_one = t8 * t8;
+        vec3 after_next = next_one * exp(-third);
+        t8 = lf_fresnel_conductor(cosine, lf_base.eta, lf_base.k);
+        series = 1.0 / max(1.0 - t5 * t8 * beam.base * beam.base, 1e-06);
+        vec3 across = t5 * t8 * beam.base;
+        vec3 one_sided = t5 * beam.upper * beam.upper + t8 * beam.lower * beam.lower;
+        vec3 one_sided2 = t5 * beam.upper * beam.middle + t8 * beam.lower * beam.middle;
+        vec3 one_sided3 = t5 * beam.upper * beam.lower + t8 * beam.lower * beam.upper;
+        vec3 one_sided4 = t5 * beam.middle * beam.middle + t8 * beam.middle * beam.middle;
+        vec3 one_sided5 = t5 * beam.middle * beam.lower + t8 * beam.middle * beam.upper;
+        vec3 one_sided6 = t5 * beam.lower * beam.lower + t8 * beam.upper * beam.upper;
+        path = 1.0 / max(outside, 1e-06);
+        Fluence beam2 = lf_fluence(t3, path);
+        third = t3 * path / 3.0;
+        thin = lessThan(third, vec3(0.1));
+        safe = mix(third, vec3(1.0), thin);
+        vec3 series2 = 0.5 - third / 6.0 * (1.0 - third / 4.0 * (1.0 - third / 5.0 * (1.0 - third / 6.0 * (1.0 - third / 7.0))));
+        vec3 own2 = 2.0 * path * path * mix((1.0 - lf_mean_transmittance(safe)) / safe, series2, thin);
+        t8 = path * lf_mean_transmittance(third);
+        vec3 next_one2 = t8 * t8;
+        vec3 after_next2 = next_one2 * exp(-third);
+        t8 = lf_fresnel_conductor(outside, lf_base.eta, lf_base.k);
+        series2 = 1.0 / max(1.0 - t8 * beam2.base * beam2.base, 1e-06);
+        vec3 across2 = t8 * beam2.base;
+        vec3 one_sided7 = beam2.upper * beam2.upper + t8 * beam2.lower * beam2.lower;
+        vec3 one_sided8 = beam2.upper * beam2.middle + t8 * beam2.lower * beam2.middle;
+        vec3 one_sided9 = beam2.upper * beam2.lower + t8 * beam2.lower * beam2.upper;
+        vec3 one_sided10 = beam2.middle * beam2.middle + t8 * beam2.middle * beam2.middle;
+        vec3 one_sided11 = beam2.middle * beam2.lower + t8 * beam2.middle * beam2.upper;
+        vec3 one_sided12 = beam2.lower * beam2.lower + t8 * beam2.upper * beam2.upper;
+        total = total + lf_row2[k] * (jacobian * (t6 * t6 * (own + series * (one_sided + across * (beam.upper * beam.lower + beam.lower * beam.upper))) + (1.0 - t6 * t6) * (own2 + series2 * (one_sided7 + across2 * (beam2.upper * beam2.lower + beam2.lower * beam2.upper)))));
+        total2 = total2 + lf_row2[k] * (jacobian * (t6 * t6 * (next_one + series * (one_sided2 + across * (beam.upper * beam.middle + beam.lower * beam.middle))) + (1.0 - t6 * t6) * (next_one2 + series2 * (one_sided8 + across2 * (beam2.upper * beam2.middle + beam2.lower * beam2.middle)))));
+        total3 = total3 + lf_row2[k] * (jacobian * (t6 * t6 * (after_next + series * (one_sided3 + across * (beam.upper * beam.upper + beam.lower * beam.lower))) + (1.0 - t6 * t6) * (after_next2 + series2 * (one_sided9 + across2 * (beam2.upper * beam2.upper + beam2.lower * beam2.lower)))));
+        total4 = total4 + lf_row2[k] * (jacobian * (t6 * t6 * (own + series * (one_sided4 + across * (beam.middle * beam.middle + beam.middle * beam.middle))) + (1.0 - t6 * t6) * (own2 + series2 * (one_sided10 + across2 * (beam2.middle * beam2.middle + beam2.middle * beam2.middle)))));
+        total5 = total5 + lf_row2[k] * (jacobian * (t6 * t6 * (next_one + series * (one_sided5 + across * (beam.middle * beam.upper + beam.middle * beam.lower))) + (1.0 - t6 * t6) * (next_one2 + series2 * (one_sided11 + across2 * (beam2.middle * beam2.upper + beam2.middle * beam2.lower)))));
+        total6 = total6 + lf_row2[k] * (jacobian * (t6 * t6 * (own + series * (one_sided6 + across * (beam.lower * beam.upper + beam.upper * beam.lower))) + (1.0 - t6 * t6) * (own2 + series2 * (one_sided12 + across2 * (beam2.lower * beam2.upper + beam2.upper * beam2.lower)))));
+    }
+    vec3 t7 = t4 * total;
+    vec3 t8 = t4 * total2;
+    vec3 t9 = t4 * total3;
+    vec3 t10 = t4 * total2;
+    vec3 t11 = t4 * total4;
+    vec3 t12 = t4 * total5;
+    vec3 t13 = t4 * total3;
+    vec3 t14 = t4 * total5;
+    vec3 t15 = t4 * total6;
+    vec3 t16 = 0.0 - t10;
+    vec3 t17 = 0.0 - t13;
+    vec3 t18 = 1.0 / max(1.0 - t7, 1e-06);
+    vec3 t19 = (0.0 - t8) * t18;
+    vec3 t20 = (0.0 - t9) * t18;
+    t7 = t7 * t18;
+    t8 = t8 * t18;
+    t9 = t9 * t18;
+    t18 = 0.0 - t14 - t17 * t19;
+    vec3 t21 = 1.0 / max(1.0 - t11 - t16 * t19, 1e-06);
+    vec3 t22 = (0.0 - t12 - t16 * t20) * t21;
+    t10 = (t10 - t16 * t7) * t21;
+    t11 = (t11 - t16 * t8) * t21;
+    t12 = (t12 - t16 * t9) * t21;
+    t16 = t20 - t19 * t22;
+    t20 = 1.0 / max(1.0 - t15 - t17 * t20 - t18 * t22, 1e-06);
+    t14 = (t14 - t17 * t8 - t18 * t11) * t20;
+    t15 = (t15 - t17 * t9 - t18 * t12) * t20;
     bool lit2 = wi.z > 0.0 && wo.z > 0.0;
     vec3 wi2 = lit2 ? wi : vec3(0.0, 0.0, 1.0);
     vec3 wo2 = lit2 ? wo : vec3(0.0, 0.0, 1.0);
@@ -416,8 +548,8 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
     float projection_o = lf_ggx_projection(wo2, lf_patina_coat.alpha);
     float V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
     float f = F * D * V;
-    Crossing i = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, tau), wi2, wi2);
-    Crossing o = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, tau), wo2, wo2);
+    Crossing i = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wi2, wi2);
+    Crossing o = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wo2, wo2);
     float throughput = i.T * o.T / (lf_patina_coat.eta * lf_patina_coat.eta);
     float straight = 1.0 / max(i.w.z, 1e-14) + 1.0 / max(o.w.z, 1e-14);
     float added = i.lengthening + o.lengthening;
@@ -425,7 +557,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
     float sin_o = sqrt(max(wo2.x * wo2.x + wo2.y * wo2.y, 0.0));
     float R_i = 1.0 - i.T;
     float R_o = 1.0 - o.T;
-    vec3 directional = lf_transmittance(tau, straight + 0.5 * added);
+    vec3 directional = lf_transmittance(t + t2, straight + 0.5 * added);
     wi2 = lf_steer(i.w, 0.5 * i.drift);
     wo2 = lf_steer(o.w, 0.5 * o.drift);
     vec3 h = lf_half_vector(wi2, wo2);
@@ -435,26 +567,26 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
     float edge_o = lf_edge_reflection(sin_o, o.w.z, lf_patina_interface.n, lf_base.alpha);
     vec3 q = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
     float spread = (pow(max(i.spread, 1e-30), 1.34) + pow(max(o.spread, 1e-30), 1.34)) * pow(max(lf_patina_coat.alpha, 1e-30), 1.34);
-    float total = spread + 3.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
-    total = total + 2.0 * pow(max(lf_patina_coat.alpha, 1e-30), 1.34);
-    float width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
+    float total7 = spread + 3.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
+    total7 = total7 + 2.0 * pow(max(lf_patina_coat.alpha, 1e-30), 1.34);
+    float width = min(pow(max(total7, 1e-30), 0.74626863), 1.5);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
     V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
-    total = spread + 2.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
-    total = total + pow(max(lf_patina_coat.alpha, 1e-30), 1.34);
-    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
+    total7 = spread + 2.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
+    total7 = total7 + pow(max(lf_patina_coat.alpha, 1e-30), 1.34);
+    width = min(pow(max(total7, 1e-30), 0.74626863), 1.5);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
     V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
-    total = spread + pow(max(lf_base.alpha, 1e-30), 1.34);
-    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
+    total7 = spread + pow(max(lf_base.alpha, 1e-30), 1.34);
+    width = min(pow(max(total7, 1e-30), 0.74626863), 1.5);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
@@ -462,12 +594,24 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
     lobe = D * V;
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * directional * F2 * lobes;
+    float path = 1.0 / max(i.w.z, 1e-14);
+    path = path + i.lengthening;
+    float path2 = 1.0 / max(o.w.z, 1e-14);
+    path2 = path2 + o.lengthening;
+    vec3 f3 = lf_once_back(0.07957747, t2, t3, path, path2);
+    Fluence beam_i = lf_fluence(t3, path);
+    Fluence beam_o = lf_fluence(t3, path2);
+    vec3 up_i = lf_fresnel_conductor(i.w.z, lf_base.eta, lf_base.k) * exp(-t3 * path);
+    vec3 up_o = lf_fresnel_conductor(o.w.z, lf_base.eta, lf_base.k) * exp(-t3 * path2);
+    vec3 f4 = lf_once_by_mirror(0.07957747, 0.07957747, t2, t3, path, path2, up_i, up_o);
+    f3 = f3 + f4;
+    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor(i.w.z, lf_base.eta, lf_base.k), R_i);
+    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor(o.w.z, lf_base.eta, lf_base.k), R_o);
+    f2 = f2 + throughput * (f3 + lf_exchanged(Haze(t3, (t7 - t19 * t10 - t16 * ((t13 - t17 * t7 - t18 * t10) * t20)) * t4, (t8 - t19 * t11 - t16 * t14) * t4, (t9 - t19 * t12 - t16 * t15) * t4, (t11 - t22 * t14) * t4, (t12 - t22 * t15) * t4, t15 * t4), beam_i, beam_o));
     vec3 patina = lit2 ? f2 : vec3(0.0);
-    vec3 once = lf_scattered_once(wi, wo, lf_patina_coat.eta, lf_patina_crust.albedo, lf_patina_crust.depth * thickness, lf_patina_crust.g);
     TwoFlux layer = lf_kubelka_munk(lf_patina_crust.absorbed * thickness, lf_patina_crust.scattered * thickness);
     vec3 diffuse = layer.R / 3.1415927;
-    vec3 total2 = once + diffuse;
-    patina = patina + total2;
+    patina = patina + diffuse;
     F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_base_bare.eta, lf_base_bare.k);
     D = lf_ggx_d(lf_half_vector(wi, wo), lf_base_bare.alpha);
     projection_i = lf_ggx_projection(wi, lf_base_bare.alpha);

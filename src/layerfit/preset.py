@@ -16,7 +16,7 @@ import numpy as np
 from ._fields import Param, given, params
 from .documents import check_keys, nearest, read_document, write_text
 from .errors import InputError
-from .forms import precise
+from .forms import patina, precise
 from .forms.corrected import Corrected
 from .forms.faithful import Faithful
 from .forms.precise import Precise
@@ -126,8 +126,7 @@ def form_of(document: Mapping[str, Any], layers: tuple[Any, ...], base: Any, whe
     model = document.get("model", "corrected" if in_time or precise.refuses(layers, base) else "precise")
     if model not in MODELS:
         raise InputError(f"{where}: model = {model!r} is not one of {', '.join(MODELS)}{nearest(str(model), MODELS)}")
-    changes = "it changes in time" if model == "precise" else None
-    reason = changes if in_time else FORMS[MODELS[model]].refuses(layers, base)
+    reason = patina.form_refuses(layers, MODELS[model]) if in_time else FORMS[MODELS[model]].refuses(layers, base)
     if reason:
         instead = "" if model == "corrected" else '. Use "corrected", which is for all of them'
         raise InputError(f'{where}: model = "{model}" is not for this material: {reason}{instead}')

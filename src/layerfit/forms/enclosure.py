@@ -1,6 +1,7 @@
 """Light between a diffuse or scattering layer and the coats over it: what comes back, by quadrature over its directions, once a material."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import jax
@@ -44,18 +45,18 @@ def _escape(coats: list[Coat], interfaces: list[Interface], lobes: Colour | None
     return _over_directions(tries, coats, interfaces)[0]
 
 
-@jax.jit
-def haze_below(coats: list[Coat], interfaces: list[Interface], base: Any) -> haze.Haze:
-    """What the innermost coat does to light that it scatters."""
+@partial(jax.jit, static_argnames="nodes")
+def haze_below(coats: list[Coat], interfaces: list[Interface], base: Any, nodes: int | None = None) -> haze.Haze:
+    """What the innermost coat does to light that it scatters; `nodes` of the quadrature, by default as many as the precision asks for."""
 
     def mean(f: Callable[[Colour, Scalar], Sequence[Colour]]) -> Sequence[Colour]:
-        return _over_directions(lambda S, cosine: f(1.0 - S, cosine), coats, interfaces)
+        return _over_directions(lambda S, cosine: f(1.0 - S, cosine), coats, interfaces, nodes)
 
     return haze.prepare(coats[-1], base, interfaces[-1].n, mean)
 
 
 def _over_directions(
-    f: Callable[[Colour, Scalar], Sequence[Colour]], coats: list[Coat], interfaces: list[Interface]
+    f: Callable[[Colour, Scalar], Sequence[Colour]], coats: list[Coat], interfaces: list[Interface], nodes: int | None = None
 ) -> Sequence[Colour]:
     """2 int f(S, mu) mu dmu over the directions in the innermost medium, mu from 0 to 1; S is what passes up and out."""
     n = interfaces[-1].n
@@ -80,7 +81,7 @@ def _over_directions(
         u, weight = node
         return [t + weight * value for t, value in zip(total, at(u), strict=True)], None
 
-    u, weight = _nodes(n.dtype)
+    u, weight = _nodes(n.dtype, nodes)
     # A colour as soon as anything is: a medium above, a lobe.
     zeros = [jnp.zeros(x.shape, x.dtype) for x in jax.eval_shape(at, n)]
     return jax.lax.scan(accumulate, zeros, (jnp.asarray(u), jnp.asarray(weight)))[0]
@@ -114,7 +115,7 @@ def remains(tau: Colour | None, path: Scalar) -> Any:
     return 1.0 if tau is None else transmittance(tau, path)
 
 
-def _nodes(dtype: np.dtype) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss-Legendre nodes and weights on [0, 1], enough for the precision of `dtype`."""
-    x, w = np.polynomial.legendre.leggauss(16 if dtype == np.float32 else 64)
+def _nodes(dtype: np.dtype, count: int | None) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss-Legendre nodes and weights on [0, 1]: `count`, or enough for the precision of `dtype`."""
+    x, w = np.polynomial.legendre.leggauss(count or (16 if dtype == np.float32 else 64))
     return (0.5 * (x + 1.0)).astype(dtype), (0.5 * w).astype(dtype)

@@ -1,8 +1,9 @@
 """The patina of a metal: bare metal where nothing has grown yet, elsewhere film and crust over it.
 
-f = (1 - M) f_metal + M (f_film + w (f_once + f_crust)), after Elek 2010: M is what is covered at a place, f_film the film as a coat over
-the metal, f_once light that is scattered once below the film's boundary, f_crust the diffuse crust. They are added, not stacked:
-the crust hides nothing of the film, so that the energy is the user's to keep, by the absorption of the film and by w.
+f = (1 - M) f_metal + M (f_film + w f_crust), after Elek 2010: M is what is covered at a place, f_film the film as a coat over the
+metal, which may scatter, and f_crust the diffuse crust. As published (`mixing = "added"`) the film is clear, and light that is scattered once
+below its boundary is added to the crust's. What is added hides nothing of the film: that energy is the user's to keep, by the absorption of
+the film and by w.
 """
 
 import dataclasses
@@ -22,10 +23,14 @@ from ..optics.medium import refract_about_normal
 from ..optics.scattering import henyey_greenstein, kubelka_munk, scattered_back
 from ..surfaces import Conductor
 from . import corrected, faithful
+from .enclosure import haze_below
 from .growth import MEAN_SKY, Cover, Growth, aged_at, cover_at, field_at, growth_of, mean_cover
 
 FORMS = {corrected.Corrected: corrected, faithful.Faithful: faithful}
 """What the film can be computed in."""
+
+NODES = 6
+"""Of the quadrature over directions in a film that scatters, for each place anew: within .005 of what is scattered again."""
 
 
 @struct
@@ -33,12 +38,12 @@ class Crust:
     """How a patina grows thicker, and what scatters light in it, one onset time after it began."""
 
     blur: Scalar = member("time in which growth sets in, in onset times")
-    albedo: Colour | None = member("part that scatters, of the light that is met")
+    albedo: Colour | None = member("part that is scattered once, of the light that is met; as published")
     depth: Scalar | None = member("optical depth of what scatters once")
     g: Any = member("mean cosine of scattering once")
     absorbed: Colour | None = member("absorption of the crust, K times its thickness")
     scattered: Colour | None = member("scattering of the crust, S times its thickness")
-    weight: Scalar | None = member("part of all scattered light that counts")
+    weight: Scalar | None = member("part that counts of the light that is added")
 
 
 @struct
@@ -98,20 +103,31 @@ def refuses(layers: tuple[Any, ...], base: Any) -> str | None:
     return f"{name} is a patina, which lies alone over a conductor; here {wrong}"
 
 
+def form_refuses(layers: tuple[Any, ...], form: type) -> str | None:
+    """Why a material that changes in time has not this form, or None."""
+    if form not in FORMS:
+        return "it changes in time"
+    scatters = next((layer for layer in layers if isinstance(layer, Patina) and layer.film.tau_s is not None), None)
+    if form is faithful.Faithful and scatters is not None:
+        return f'{scatters.name} scatters light in its film, which this form does not know: give it mixing = "added"'
+    return None
+
+
 def prepare(layers: tuple[Any, ...], base: Any, form: Any) -> Prepared:
     """The film's constants in its form, and how far the growth has come. Raises `InputError` where a patina cannot be."""
     if reason := refuses(layers, base):
         raise InputError(reason)
     if type(form) not in FORMS:
         raise InputError(f"a patina has no {type(form).__name__.lower()} form: use corrected or faithful")
+    if reason := form_refuses(layers, type(form)):
+        raise InputError(reason)
     (layer,) = layers
-    return Prepared(
-        film=FORMS[type(form)].prepare((layer.film,), base, form),
-        bare=base.below(1.0),
-        growth=growth_of(layer),
-        crust=Crust(**{field.name: getattr(layer, field.name) for field in dataclasses.fields(Crust)}),
-        spot=None,
-    )
+    film = FORMS[type(form)].prepare((layer.film,), base, form)
+    crust = Crust(**{field.name: getattr(layer, field.name) for field in dataclasses.fields(Crust)})
+    if film.coats[0].tau_s is not None:
+        film = dataclasses.replace(film, haze=None)  # that of every thickness is computed at its place
+        crust = dataclasses.replace(crust, albedo=None, depth=None, g=None)
+    return Prepared(film=film, bare=base.below(1.0), growth=growth_of(layer), crust=crust, spot=None)
 
 
 def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
@@ -121,7 +137,7 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
     wi = where(lit, wi, up)
     wo = where(lit, wo, up)
     spot = prepared.spot or mean_spot(prepared)
-    film = _as_thick(prepared.film, spot.thickness)
+    film = _as_thick(prepared.film, spot.thickness, form)
     patina = FORMS[type(form)].evaluate(film, wi, wo, form)
     scattered = _scattered(prepared.crust, film.coats[0].eta, spot.thickness, wi, wo)
     if scattered is not None:
@@ -131,16 +147,17 @@ def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
     return where(lit, f, 0.0)
 
 
-def _as_thick(film: Any, thickness: Scalar) -> Any:
+def _as_thick(film: Any, thickness: Scalar, form: Any) -> Any:
     """The film where it is so many times as thick."""
     (coat,) = film.coats
-    if coat.tau is None:
-        return film
-    tau = coat.tau * thickness
-    film = dataclasses.replace(film, coats=(dataclasses.replace(coat, tau=tau),))
-    if getattr(film, "trapped", None) is None:
-        return film
-    return dataclasses.replace(film, trapped=corrected.trapped_light(film.base, tau, coat.eta))
+    depths = {name: getattr(coat, name) * thickness for name in ("tau", "tau_s") if getattr(coat, name) is not None}
+    coat = dataclasses.replace(coat, **depths)
+    film = dataclasses.replace(film, coats=(coat,))
+    if getattr(film, "trapped", None) is not None:
+        film = dataclasses.replace(film, trapped=corrected.trapped_light(film.base, coat.extinction, coat.eta))
+    if coat.tau_s is not None and form.multiple:
+        film = dataclasses.replace(film, haze=haze_below([coat], list(film.interfaces), film.base, NODES))
+    return film
 
 
 def _scattered(crust: Crust, eta: Scalar, thickness: Scalar, wi: Vec3, wo: Vec3) -> Colour | None:

@@ -39,6 +39,5 @@ def copper_patina(years: float = 20.0, onset_years: float = 10.0, seed: int = 0,
         scattered=0.7,
         albedo=[0.2, 0.6, 0.5],
         depth=0.3,
-        g=0.0,
     )
     return Stack((layer,), Conductor(alpha=0.25, eta=COPPER_ETA, k=COPPER_K), Corrected())
