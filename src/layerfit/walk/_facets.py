@@ -26,7 +26,7 @@ _INV_SQRT_PI = 1.0 / math.sqrt(math.pi)
 _TINY = 1e-30  # keeps a quotient finite where it is not used
 
 
-def where(condition: Flag, yes: Any, no: Any) -> Any:
+def where(condition: bool | Flag, yes: Any, no: Any) -> Any:
     """`jnp.where` through tuples, in float32, and no function of its own."""
 
     def one(a: Any, b: Any) -> Any:
