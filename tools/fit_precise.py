@@ -1,11 +1,11 @@
 """Fit the constants of the precise form to the random walk.
 
-    python tools/fit_precise.py make ROWS.npz [--count 600] [--paths 30000] [--seed 1] [--facets beckmann] [--axes]
+    python tools/fit_precise.py make ROWS.npz [--count 600] [--paths 30000] [--seed 1] [--facets beckmann] [--axes] [--two-coats]
     python tools/fit_precise.py fit ROWS.npz [ROWS.npz ...]
     python tools/fit_precise.py check ROWS.npz [ROWS.npz ...] [--model corrected]
 
 `make` walks through random materials (GGX coat .03 to .6 wide, index 1.25 to 2.2, optical depth 0 to 2, over a conductor .05 to .8 wide or
-a Lambert base) at random angles, with `--axes` of a width for each axis; `fit` prints the constants
+a Lambert base) at random angles, with `--axes` of a width for each axis, with `--two-coats` below a second coat; `fit` prints the constants
 of the form; `check` prints how near it is: per row the
 sum of |f - truth| cos over that of truth cos, light from below the coat only, as median and 90th percentile over the rows.
 """
@@ -29,7 +29,7 @@ VIEWS = 6
 NARROW = 0.2
 
 
-def make(path: Path, count: int, paths: int, seed: int, facets: str, axes: bool) -> None:
+def make(path: Path, count: int, paths: int, seed: int, facets: str, axes: bool, two_coats: bool) -> None:
     """Half of the rows for each interface; three of four over a conductor."""
     rng = np.random.default_rng(seed)
     log = lambda low, high, n: np.exp(rng.uniform(np.log(low), np.log(high), n))  # noqa: E731
@@ -37,24 +37,36 @@ def make(path: Path, count: int, paths: int, seed: int, facets: str, axes: bool)
     saved: dict[str, np.ndarray] = {}
     for interface in ("single", "multi"):
         for kind, n in (("conductor", count * 3 // 8), ("lambert", count // 8)):
-            coat = width(0.03, 0.6, n) | {
-                "eta": rng.uniform(1.25, 2.2, n),
-                "tau": rng.uniform(0, 2, n) * (rng.random(n) > 0.25),
-            }
+            lacquer = lambda n=n: (  # noqa: E731
+                width(0.03, 0.6, n) | {"eta": rng.uniform(1.25, 2.2, n), "tau": rng.uniform(0, 2, n) * (rng.random(n) > 0.25)}
+            )
+            coats = [lacquer() for _ in range(2 if two_coats else 1)]
             base = {"albedo": rng.uniform(0.2, 0.95, n)}
             if kind == "conductor":
                 base = width(0.05, 0.8, n) | {"eta": rng.uniform(0.2, 3.0, n), "k": rng.uniform(1.5, 6.0, n)}
             wi, wo = directions(rng, n, VIEWS)
             flat = lambda table: {key: value.repeat(VIEWS) for key, value in table.items()}  # noqa: E731
             surface = Lambert if kind == "lambert" else Conductor
-            top = layer(Coat, flat(coat), masking="smith_separable", distribution=facets)
-            stack = Stack((top,), layer(surface, flat(base)))
+            layers = [
+                layer(Coat, flat(coat), name=name, masking="smith_separable", distribution=facets)
+                for name, coat in named(coats)
+            ]
+            stack = Stack(tuple(layers), layer(surface, flat(base)))
             found = walk_rows(stack, wi.reshape(-1, 3), wo.reshape(-1, 3), paths=paths, seed=seed, interface=interface)
             name = f"{interface}_{kind}"
-            columns = coat | {f"base_{key}": value for key, value in base.items()} | {"wi": wi[:, 0], "wo": wo}
+            columns = {f"{part}_{key}": value for part, of in (*named(coats), ("base", base)) for key, value in of.items()}
+            columns |= {"wi": wi[:, 0], "wo": wo}
             saved |= {f"{name}_{key}": value for key, value in columns.items()}
             saved |= {f"{name}_f": found.mean.mean(-1).reshape(n, VIEWS), f"{name}_se": found.se.mean(-1).reshape(n, VIEWS)}
     np.savez_compressed(path, facets=facets, **saved)
+
+
+NAMES = "coat", "primer"
+"""Of the coats, outermost first."""
+
+
+def named(coats: list[Any]) -> list[tuple[str, Any]]:
+    return list(zip(NAMES, coats, strict=False))
 
 
 def layer(kind: Any, values: dict[str, Any], **choices: Any) -> Any:
@@ -93,22 +105,22 @@ def rows(paths: list[Path], interface: str, kind: str) -> dict[str, np.ndarray]:
 
 def form(row: dict[str, Any], interface: str, kind: str, facets: str = "ggx", model: str = "precise") -> Any:
     """Light from below the coat, (rows, views)."""
-    base = {key.removeprefix("base_"): value for key, value in row.items() if key.startswith("base_")}
-    coat = {key: row[key] for key in ("alpha", "alpha_x", "alpha_y", "eta", "tau") if key in row}
+    part = lambda name: {key.removeprefix(f"{name}_"): value for key, value in row.items() if key.startswith(f"{name}_")}  # noqa: E731
+    coats = tuple(layer(Coat, part(name), name=name, distribution=facets) for name in NAMES if part(name))
 
-    def one(coat: Coat, base: Any, wi: Any, wo: Any) -> Any:
+    def one(coats: tuple[Coat, ...], base: Any, wi: Any, wo: Any) -> Any:
         options: Any = precise.Precise(interface) if model == "precise" else corrected.Corrected()
-        p: Any = (precise if model == "precise" else corrected).prepare((coat,), base, options)
+        p: Any = (precise if model == "precise" else corrected).prepare(coats, base, options)
 
         def pair(wo: Any) -> Any:
             if model == "corrected":
-                return corrected.evaluate(p, wi, wo, options) - coat.evaluate(wi, wo)
+                return corrected.evaluate(p, wi, wo, options) - coats[0].evaluate(wi, wo)
             return precise.below(precise.cross(p, wi), precise.cross(p, wo), p)
 
         return jax.vmap(pair)(wo)
 
     surface = Lambert if kind == "lambert" else Conductor
-    return jax.vmap(one)(layer(Coat, coat, distribution=facets), layer(surface, base), row["wi"], row["wo"])
+    return jax.vmap(one)(coats, layer(surface, part("base")), row["wi"], row["wo"])
 
 
 def error(f: np.ndarray, row: dict[str, np.ndarray]) -> np.ndarray:
@@ -212,10 +224,19 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--facets", choices=("ggx", "beckmann"), default="ggx", help="of the coat")
     parser.add_argument("--axes", action="store_true", help="widths along the tangent and across it")
+    parser.add_argument("--two-coats", action="store_true", help="a second coat below the first")
     parser.add_argument("--model", choices=("precise", "corrected"), default="precise", help="form to check")
     arguments = parser.parse_args()
     if arguments.command == "make":
-        make(arguments.rows[0], arguments.count, arguments.paths, arguments.seed, arguments.facets, arguments.axes)
+        make(
+            arguments.rows[0],
+            arguments.count,
+            arguments.paths,
+            arguments.seed,
+            arguments.facets,
+            arguments.axes,
+            arguments.two_coats,
+        )
     elif arguments.command == "fit":
         fit(arguments.rows)
     else:
