@@ -2,8 +2,9 @@
 
     python benchmarks/recovery.py FOLDER [FOLDER ...] [--only NAME] [--model MODEL]
 
-Folders of renders with known materials, such as examples/references; see `renders.py`. Prints one row a render and the
-median and 90th percentile over all parameters; optical depths are compared with a floor of .3.
+Folders of renders with known materials, such as examples/references; see `renders.py`. Prints one row a render, and for the values and for those
+without the error of their form the median and 90th percentile over all parameters; optical depths are compared with a floor of .3. And how
+many truths are within one, two and three sigma of the value.
 """
 
 import argparse
@@ -19,10 +20,12 @@ from rich.table import Table
 
 from layerfit.capture.load import load
 from layerfit.fit.fit import fit
+from layerfit.fit.result import FitResult, parameters
+from layerfit.fit.words import NONE
 
 
-def fitted(render: Render) -> tuple[Any, dict[str, Any], float]:
-    """Fit a render; the result, its values by name, and the seconds it took."""
+def fitted(render: Render) -> tuple[FitResult, float]:
+    """Fit a render; the result, and the seconds it took."""
     request = render.scene.fit
     start = time.perf_counter()
     result = fit(
@@ -32,8 +35,20 @@ def fitted(render: Render) -> tuple[Any, dict[str, Any], float]:
         fixed=dict(request.fixed),
         metric=request.metric,
         loss=request.loss,
+        model_error=True,
     )
-    return result, result.free.values(result.vector), time.perf_counter() - start
+    return result, time.perf_counter() - start
+
+
+def pulls(rows: dict[str, Any], truth: dict[str, Any]) -> list[float]:
+    """(value - truth) / sigma of each number whose truth and sigma are known."""
+    found = []
+    for name in rows.keys() & truth.keys():
+        value, sigma, wanted = (
+            np.atleast_1d(np.array(x, float)) for x in (rows[name]["value"], rows[name]["sigma"], truth[name])
+        )
+        found += ((value - wanted) / sigma)[np.isfinite(sigma)].tolist()
+    return found
 
 
 def main() -> None:
@@ -42,32 +57,49 @@ def main() -> None:
     parser.add_argument("--only", default="", help="part of the names of the renders to fit")
     parser.add_argument("--model", help="model of the material, where the scene is made here")
     arguments = parser.parse_args()
-    table = Table("render", "found (true)", "worst error", "residual", "seconds")
-    every: list[float] = []
+    table = Table("render", "found", "corrected", "true", "worst error", "corrected", "residual", "seconds")
+    every: dict[str, list[float]] = {"value": [], "corrected": []}
+    pulled: list[float] = []
     with tempfile.TemporaryDirectory() as scratch:
         for folder in arguments.folders:
             for render in renders(folder, Path(scratch), arguments.model):
                 if arguments.only not in render.name:
                     continue
-                result, values, seconds = fitted(render)
-                found = errors(render, values)
-                every += found.values()
-                cells = [f"{name} {_text(value)}" + _true(render, name) for name, value in values.items()]
-                residual = result.trace[-1].error
-                worst = f"{max(found.values()):.3f}" if found else "not known"
-                table.add_row(render.name, "\n".join(cells), worst, f"{residual:.2e}", f"{seconds:.1f}")
-    console = Console(width=140)
+                result, seconds = fitted(render)
+                rows = parameters(result)
+                off = {key: errors(render, {name: row.get(key, row["value"]) for name, row in rows.items()}) for key in every}
+                for key, values in off.items():
+                    every[key] += values.values()
+                pulled += pulls(rows, render.truth)
+                columns = [
+                    [f"{name} {_text(row['value'])} +/- {_text(row['sigma'])}" for name, row in rows.items()],
+                    [_text(row.get("corrected")) for row in rows.values()],
+                    [_text(render.truth.get(name)) for name in rows],
+                ]
+                worst = [f"{max(values.values()):.3f}" if values else "not known" for values in off.values()]
+                table.add_row(
+                    render.name,
+                    *("\n".join(cells) for cells in columns),
+                    *worst,
+                    f"{result.trace[-1].error:.2e}",
+                    f"{seconds:.1f}",
+                )
+    console = Console(width=190)
     console.print(table)
-    if every:
-        console.print(f"{len(every)} parameters: median error {np.median(every):.3f}, p90 {np.quantile(every, 0.9):.3f}")
+    for key, values in every.items():
+        if values:
+            console.print(
+                f"{len(values)} parameters, {key}: median error {np.median(values):.3f}, p90 {np.quantile(values, 0.9):.3f}"
+            )
+    if pulled:
+        within = (f"{np.mean(np.abs(pulled) <= k):.3f}" for k in (1, 2, 3))
+        console.print(f"{len(pulled)} with a sigma: within one, two, three sigma {', '.join(within)}")
 
 
 def _text(value: Any) -> str:
-    return " ".join(f"{v:.4g}" for v in np.atleast_1d(value))
-
-
-def _true(render: Render, name: str) -> str:
-    return f"  ({_text(render.truth[name])})" if name in render.truth else ""
+    return (
+        "" if value is None else " ".join(f"{NONE if v is None else format(v, '.4g')}" for v in np.atleast_1d(value).tolist())
+    )
 
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from layerfit.fit.residuals import initial
-from layerfit.fit.solve import NormalLevenbergMarquardt, columns, normal_equations, products, scores, tangents
-from layerfit.fit.uncertainty import estimate
+from layerfit.fit.solve import NormalLevenbergMarquardt, columns, dense, normal_equations, products, tangents
+from layerfit.fit.uncertainty import GROUPS, estimate
 
 SLOTS = ((0,), (1, 2, 3), (4,))
 RNG = np.random.default_rng(1)
@@ -69,11 +69,14 @@ def minimise(start, lower=-np.inf, upper=np.inf, target=TARGET, residual=residua
 def test_normal_equations_are_those_of_the_dense_jacobian():
     u = jnp.array([0.6, 0.4, 0.9, 1.5, 0.5])
     r = np.asarray(residual(fields(u))).ravel()
-    dense = np.asarray(jax.jacfwd(lambda u: residual(fields(u)).ravel())(u))
+    wanted = np.asarray(jax.jacfwd(lambda u: residual(fields(u)).ravel())(u))
+    rows, at = dense(derivatives(residual, fields(u)), SLOTS)
+    np.testing.assert_allclose(rows.transpose(1, 0, 2).reshape(-1, 5), wanted, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(at.T.ravel(), r)
     loss, (gradient, gram) = normal_equations(products(derivatives(residual, fields(u))), SLOTS)
     np.testing.assert_allclose(loss, 0.5 * r @ r, rtol=1e-13)
-    np.testing.assert_allclose(gradient, dense.T @ r, rtol=1e-12)
-    np.testing.assert_allclose(gram, dense.T @ dense, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(gradient, wanted.T @ r, rtol=1e-12)
+    np.testing.assert_allclose(gram, wanted.T @ wanted, rtol=1e-12, atol=1e-12)
 
 
 def test_sums_of_float32_residuals_are_float64():
@@ -157,19 +160,14 @@ NOISE = {
 @pytest.mark.parametrize("noise", NOISE)
 def test_sigmas_are_the_scatter_of_repeated_fits(noise):
     truth = np.asarray(model(fields(jnp.asarray(TRUTH))))
-    groups = np.arange(200) % 12 == np.arange(12)[:, None]
+    part = np.arange(200) % GROUPS
     found, sigmas = [], []
     for seed in range(100):
         target = truth + NOISE[noise](np.random.default_rng(seed))
         u, state, _ = minimise(TRUTH, target=target)
-        rows = jacobian(u, target, residual)
-        parts = [normal_equations(products([row * group for row in rows]), SLOTS)[1] for group in groups]
-        parts = [tuple(map(np.asarray, part)) for part in parts]
-        gradients = scores(rows, SLOTS)
-        np.testing.assert_allclose(gradients.sum(1), np.sum([part[0] for part in parts], 0), atol=1e-9)
+        rows = dense(jacobian(u, target, residual), SLOTS)
         found.append(u)
-        uncertainty = estimate(np.asarray(state.gram), np.zeros(5, bool), target.size, gradients @ gradients.T, parts)
-        sigmas.append(uncertainty.sigma)
+        sigmas.append(estimate(np.asarray(state.gram), np.zeros(5, bool), *rows, part).sigma)
     np.testing.assert_allclose(np.sqrt(np.mean(np.square(sigmas), 0)), np.std(found, 0), rtol=0.25)  # of a hundred: 7 %
 
 
@@ -177,15 +175,15 @@ def test_misfit_that_neighbours_share_widens_a_sigma():
     """Twelve parts that pull a mean apart, by more than the scatter of their pixels."""
     offsets = np.random.default_rng(0).normal(size=12)
     offsets -= offsets.mean()
-    pixels = np.repeat(offsets, 50)[None]
-    parts = [(np.array([50.0 * offset]), np.array([[50.0]])) for offset in offsets]
-    found = estimate(np.array([[600.0]]), np.zeros(1, bool), 600, pixels @ pixels.T, parts)
+    residual, part = np.repeat(offsets, 50)[:, None], np.repeat(np.arange(12), 50)
+    found = estimate(np.array([[600.0]]), np.zeros(1, bool), np.ones((600, 1, 1)), residual, part)
     np.testing.assert_allclose(found.sigma, np.std(offsets, ddof=1) / np.sqrt(12), rtol=0.05)
 
 
 def test_a_direction_that_nothing_sees_is_named():
     gram = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 2.0]])
-    found = estimate(gram, np.zeros(3, bool), 100, 0.01 * gram, [(np.zeros(3), gram / 2)] * 2)
+    jacobian = np.repeat([[[1.0, 1.0, 0.0]], [[0.0, 0.0, 2.0**0.5]]], 12, 0) / 12**0.5
+    found = estimate(gram, np.zeros(3, bool), jacobian, np.full((24, 1), 0.1), np.arange(24) % 12)
     assert len(found.blind) == 1
     np.testing.assert_allclose(np.abs(found.blind[0]), [0.5**0.5, 0.5**0.5, 0.0], atol=1e-9)
     assert np.all(found.sigma[:2] > 10.0 * found.sigma[2]), "what is not seen is not known"

@@ -75,13 +75,14 @@ def _kept(path: Path) -> export.Exported | None:
 class Compiled:
     """A traced function with one executable for each structure and size of its arguments, made when it is first called."""
 
-    def __init__(self, fn: Callable[..., Any], optimise: int = 3):
+    def __init__(self, fn: Callable[..., Any], optimise: int = 3, **options: Any):
         """Keyword arguments of `fn` are structure, not numbers.
 
         `optimise`: 3 for what runs over pixels, 1 for what runs once a step, 0 for what runs once: it compiles sooner.
+        `options` are XLA's, beside `OPTIONS`.
         """
         self._fn = fn
-        self._options = OPTIONS | {"xla_backend_optimization_level": optimise}
+        self._options = OPTIONS | {"xla_backend_optimization_level": optimise} | options
         self._executables: dict[Any, tuple[Future[Any], Any]] = {}
 
     def begin(self, *args: Any, **static: Any) -> Any:

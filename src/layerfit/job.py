@@ -85,6 +85,7 @@ def fit_scene(
         loss=request.loss,
         starts=request.starts,
         seed=request.seed,
+        model_error=True,
         where=f"{path}: fit",
         progress=progress,
     )

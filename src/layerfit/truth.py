@@ -21,7 +21,7 @@ from .preset import MODELS, model_name
 from .render import brdf
 from .report import truth as report
 from .stack import FORMS, IN_TIME, Stack
-from .walk import Estimate, Haze, check, top_lobe, walk
+from .walk import Estimate, check, hazes, top_lobe, walk
 
 INCIDENCE_DEG = (0.0, 20.0, 40.0, 60.0, 75.0)
 PLANE_DEG = (20.0, 60.0, 75.0)
@@ -191,13 +191,7 @@ def _relative(difference: np.ndarray, truth: Estimate, fan: Fan) -> np.ndarray:
 
 
 def _walk(stack: Stack, fan: Fan, paths: int, interface: Any, seed: int) -> Estimate:
-    return walk(stack, fan.wi, fan.wo, paths=paths, seed=seed, interface=interface, haze=_haze(stack))
-
-
-def _haze(stack: Stack) -> dict[str, Haze]:
-    """The coats that scatter, as the walk knows them."""
-    scatters = [coat for coat in stack.layers if coat.tau_s is not None]
-    return {coat.name: Haze(coat.tau_s, 0.0 if coat.g is None else coat.g) for coat in scatters}
+    return walk(stack, fan.wi, fan.wo, paths=paths, seed=seed, interface=interface, haze=hazes(stack))
 
 
 def _counts(stack: Stack, fans: Sequence[Fan], interface: str, paths: int | None, seed: int, progress: Progress) -> list[int]:

@@ -6,6 +6,7 @@ are compared by in the field are.
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -53,3 +54,8 @@ def curve(metric: str, white: np.ndarray) -> Curve | None:
 def compared(values: Any, by: Curve | None) -> np.ndarray:
     """Values (pixels, 3) as they are compared."""
     return np.asarray(values if by is None else by(np.asarray(values)))
+
+
+def slope(values: np.ndarray, by: Curve | None) -> np.ndarray:
+    """How much a small difference of values (pixels, 3) counts when they are compared."""
+    return np.ones_like(values) if by is None else np.asarray(jax.jvp(by, (values,), (np.ones_like(values),))[1])

@@ -17,10 +17,11 @@ from ..capture.scene import METRICS
 from ..documents import nearest
 from ..errors import InputError
 from ..stack import Stack
+from . import discrepancy
 from .blocks import Block, arrange, channels_first
-from .difference import Curve, compared, curve
+from .difference import Curve, compared, curve, slope
 from .parameters import Parametrisation, parametrise, with_fixed
-from .residuals import NEAR, begin, depths, initial, parts, scaled, step
+from .residuals import NEAR, begin, depths, initial, rows, scaled, step
 from .result import FitResult, Held, Minimum, Row
 from .solve import NormalLevenbergMarquardt
 from .uncertainty import GROUPS, estimate
@@ -54,6 +55,7 @@ def fit(
     loss: str = "square",
     starts: int = 8,
     seed: int = 0,
+    model_error: bool = False,
     where: str = "fit",
     progress: Callable[[str, float], None] = lambda stage, share: None,
 ) -> FitResult:
@@ -61,16 +63,17 @@ def fit(
 
     `free` are names such as "coat.alpha" (left out: what an image can tell), `fixed` are values by name. `metric` is "law", "uniform",
     "relative", "log" or "cube_root" (see `difference`), `loss` "square", "huber" or "cauchy". `starts` space-filling starts are tried beside
-    the given one, all coarsely on few pixels, the best of them to the end. Raises `InputError` for what cannot be fitted.
+    the given one, all coarsely on few pixels, the best of them to the end. With `model_error` sigmas hold what the form of the model gets
+    wrong, too: a random walk tells it, at the fitted material (see `discrepancy`). Raises `InputError` for what cannot be fitted.
     """
     if metric not in METRICS:
         raise InputError(f"{where}.metric = {metric!r}: should be one of {', '.join(METRICS)}{nearest(metric, METRICS)}")
     with jax.enable_x64(True):
-        return _Fit(views, start, free, fixed or {}, metric, loss, starts, seed, where, progress).run()
+        return _Fit(views, start, free, fixed or {}, metric, loss, starts, seed, model_error, where, progress).run()
 
 
 class _Fit:
-    def __init__(self, views, start, free, fixed, metric, loss, starts, seed, where, progress):
+    def __init__(self, views, start, free, fixed, metric, loss, starts, seed, model_error, where, progress):
         start = with_fixed(start, fixed, f"{where}.fixed")
         free, self.held = _without_gauge(start, free, views)
         start, self.free = parametrise(start, free, tuple(fixed), where)
@@ -80,7 +83,7 @@ class _Fit:
         for view in views:
             view.check(start)
         self.views, self.metric, self.loss, self.starts, self.seed, self.where = views, metric, loss, starts, seed, where
-        self.progress = progress
+        self.model_error, self.progress = model_error, progress
         self.trace: list[Row] = []
         self.clock = dataclasses.replace(CLOCK)
         self.began = time.perf_counter()
@@ -100,6 +103,8 @@ class _Fit:
         for view, samples in zip(self.views, self.samples, strict=True):
             stack = scaled(self.start, view.scales(self.start))
             render.begin(stack, samples.wi.shape[1], narrowed(samples.place, stack.needs))
+        if self.model_error:
+            discrepancy.begin(self.start)
         self._weigh(None)
         self._drop_blind(origin)
         origin = self.free.pack(self.start)
@@ -111,8 +116,10 @@ class _Fit:
             u, cost, converged, gram = self._descend(u, self.blocks, FINE_STEPS, f"fine {k + 1}", best.start)
             self.progress("fine", (k + 1) / ROUNDS)
         held = (u <= self.bounds[0]) | (u >= self.bounds[1])
-        uncertainty = estimate(gram, held, self._residuals(), *self._parts(u))
+        jacobian, residual = rows(u, self.start, self.blocks, free=self.free)
+        uncertainty = estimate(gram, held, jacobian, residual, self._sectors())
         models = self._models(u)
+        off = self._discrepancy(u, models, jacobian, gram, held) if self.model_error else None
         clock = CLOCK.since(self.clock)
         return FitResult(
             stack=self._material(u),
@@ -122,6 +129,7 @@ class _Fit:
             start_vector=origin,
             gram=gram,
             uncertainty=uncertainty,
+            discrepancy=off,
             held=self.held,
             converged=converged,
             cost=cost,
@@ -136,9 +144,6 @@ class _Fit:
             clock=clock,
             solve_s=time.perf_counter() - self.began - clock.trace_s - clock.compile_s,
         )
-
-    def _residuals(self) -> int:
-        return sum(s.target.size for s in self.samples)
 
     def _weigh(self, u: np.ndarray | None) -> None:
         """Set the residual weights from the model at `u`, or equal ones before there is a model."""
@@ -233,13 +238,23 @@ class _Fit:
             polished.append(Minimum(minimum.start, u, cost))
         return sorted(polished, key=lambda m: m.cost) + found[3:]
 
-    def _parts(self, u: np.ndarray) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
-        """Scatter of the gradient; and gradient and J^T J of parts of the image: sectors around the highlight, each with a share of every
-        half angle."""
-        sector = self.layout.scatter([_sectors(samples, GROUPS) for samples in self.samples], -1.0)
-        groups = sector == np.arange(GROUPS)[:, None, None]
-        scatter, found = parts(u, self.start, self.blocks, groups, free=self.free)
-        return scatter, [(np.asarray(gradient), np.asarray(gram)) for _, (gradient, gram) in found]
+    def _discrepancy(
+        self, u: np.ndarray, models: Sequence[np.ndarray], jacobian: np.ndarray, gram: np.ndarray, held: np.ndarray
+    ) -> discrepancy.Discrepancy | None:
+        """What the form gets wrong; None, with a note, where no random walk can tell."""
+        stack = self._material(u)
+        if reason := discrepancy.unmeasured(stack):
+            self.notes.append(f"what the form of the model gets wrong is in no sigma: {reason}")
+            return None
+        self.progress("walk", 0.0)
+        place = self.layout.reference.ravel(), self.layout.pixel.ravel()
+        slopes = self.layout.scatter([slope(m, by) for m, by in zip(models, self.curves, strict=True)], 0.0).reshape(-1, 3)
+        weights = np.concatenate([np.asarray(block.inverse_sigma).T for block in self.blocks])
+        return discrepancy.measure(stack, self.views, self.samples, place, jacobian, slopes * weights, gram, held, self.seed)
+
+    def _sectors(self) -> np.ndarray:
+        """Sector of the image that each pixel of the blocks is in, around the highlight: each has its share of every half angle."""
+        return self.layout.scatter([_sectors(samples, GROUPS) for samples in self.samples], -1.0).ravel()
 
 
 def _have_no_effect(names: Sequence[str]) -> str:

@@ -12,7 +12,7 @@ from ..render import shade
 from ..stack import Stack, prepared
 from .blocks import Block
 from .parameters import Parametrisation
-from .solve import Normal, columns, normal_equations, products, scores, tangents
+from .solve import columns, dense, normal_equations, products, tangents
 
 
 def depths(layer: Any) -> list[str]:
@@ -95,26 +95,12 @@ def step(
     return u, jax.tree.unflatten(jax.tree.structure(state), leaves)
 
 
-def parts(
-    u: Any, start: Stack, blocks: Sequence[Block], groups: np.ndarray, *, free: Parametrisation
-) -> tuple[np.ndarray, list[Normal]]:
-    """Products of the pixels' gradients, summed, and normal equations of groups of pixels, from one evaluation of the model at `u`.
-
-    `groups` (groups, blocks, pixels) are masks.
-    """
+def rows(u: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation) -> tuple[np.ndarray, np.ndarray]:
+    """Jacobian (pixels, channels, parameters) and residuals (pixels, channels) at `u`, weighted; the pixels block by block."""
     slots = tuple(f.slots for f in free.free)
-    evaluated = [
-        [np.asarray(column) for column in part] for part in _started(np.asarray(u).astype(np.float32), start, blocks, free)
-    ]
-    gradients = (scores(part, slots) for part in evaluated)
-    scatter = np.sum([gradient @ gradient.T for gradient in gradients], 0)
-    equations = [
-        normal_equations(
-            np.sum([products([c * m for c in part]) for part, m in zip(evaluated, mask, strict=True)], 0), slots, np
-        )
-        for mask in groups
-    ]
-    return scatter, equations
+    parts = [dense(part, slots) for part in _started(np.asarray(u).astype(np.float32), start, blocks, free)]
+    jacobian, residual = zip(*parts, strict=True)
+    return np.concatenate(jacobian), np.concatenate(residual)
 
 
 NEAR = 1e4

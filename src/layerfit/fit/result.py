@@ -13,6 +13,7 @@ from ..capture.samples import Samples
 from ..preset import left_out, rounded
 from ..stack import Stack
 from . import words
+from .discrepancy import Discrepancy
 from .parameters import Parametrisation
 from .uncertainty import WEAK_SIGMA, Uncertainty, in_words
 
@@ -69,6 +70,9 @@ class FitResult:
     gram: np.ndarray
     """J^T J at the solution, in the coordinates of the fit."""
     uncertainty: Uncertainty
+    """By noise and misfit of the images."""
+    discrepancy: Discrepancy | None
+    """By what the form of the model gets wrong; None where it was not measured."""
     held: list[Held]
     converged: bool
     cost: float
@@ -100,10 +104,15 @@ def _heading(result: FitResult) -> str:
 
 
 def parameters(result: FitResult) -> dict[str, dict[str, Any]]:
-    """Every free parameter with its value, start, sigma and state, and the derived optical depths."""
+    """Every free parameter with its value, start, sigma and state, and the derived optical depths.
+
+    Where the form's error was measured, `sigma` holds `sigma_noise` and `sigma_model`, and `corrected` is the value without that error.
+    """
     u, free = result.vector, result.free
     slopes, sigma = free.slopes(u), _sigmas(result)
     low, high = _at_bounds(result)
+    known = result.discrepancy is not None
+    corrected = free.values(_corrected(result)) if known else {}
     values, starts = free.values(u), free.values(result.start_vector)
     rows: dict[str, dict[str, Any]] = {}
     for f in free.free:
@@ -113,9 +122,12 @@ def parameters(result: FitResult) -> dict[str, dict[str, Any]]:
             "start": rounded(starts[f.name]),
             "sigma": _sigma(slopes[at] * sigma[at]),
             "at_bound": "lower" if np.any(low[at]) else "upper" if np.any(high[at]) else None,
-            "identifiable": not np.any(sigma[at] >= WEAK_SIGMA),
+            "identifiable": not np.any(result.uncertainty.sigma[at] >= WEAK_SIGMA),
             "unit": f.spec.unit,
         }
+        if known:
+            rows[f.name] |= {key: _sigma(slopes[at] * part[at]) for key, part in _sigma_parts(result).items()}
+            rows[f.name]["corrected"] = rounded(corrected[f.name])
     for layer in result.stack.layers:
         if getattr(layer, "absorption_per_mm", None) is not None:
             rows[f"{layer.name}.tau"] = _derived_tau(result, layer)
@@ -131,8 +143,22 @@ def _at_bounds(result: FitResult) -> tuple[np.ndarray, np.ndarray]:
 
 def _sigmas(result: FitResult) -> np.ndarray:
     """Sigmas in the coordinates of the fit; NaN at a bound, where the data pull one way only and nothing tells how far."""
-    low, high = _at_bounds(result)
-    return np.where(low | high, np.nan, result.uncertainty.sigma)
+    total = np.sqrt(sum(part**2 for part in _sigma_parts(result).values()))
+    return np.where(np.logical_or(*_at_bounds(result)), np.nan, total)
+
+
+def _sigma_parts(result: FitResult) -> dict[str, np.ndarray]:
+    """By what the images are scattered by, and by what the form gets wrong: the whole of it, as no one value is owed the correction."""
+    parts = {"sigma_noise": result.uncertainty.sigma}
+    if result.discrepancy is not None:
+        parts["sigma_model"] = np.hypot(result.discrepancy.step, result.discrepancy.error)
+    return parts
+
+
+def _corrected(result: FitResult) -> np.ndarray:
+    """The vector that an exact form would have been fitted with, inside the bounds."""
+    step = np.zeros_like(result.vector) if result.discrepancy is None else result.discrepancy.step
+    return np.clip(result.vector + step, *result.free.bounds())
 
 
 def _sigma(values: np.ndarray) -> Any:
@@ -204,7 +230,7 @@ def to_json(
         "converged": result.converged,
         "flags": flags(result, rows, pairs),
         "parameters": rows,
-        "sigma_is": words.SIGMA,
+        "sigma_is": words.SIGMA if result.discrepancy is None else words.WHOLE_SIGMA,
         "correlations": pairs,
         "unidentified": unidentified(result),
         "error": error,

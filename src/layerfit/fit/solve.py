@@ -48,17 +48,17 @@ def products(columns: Sequence[Any]) -> np.ndarray:
     return rows @ rows.swapaxes(1, 2)
 
 
-def scores(columns: Sequence[Any], slots: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    """Each pixel's own part of the gradient, (parameters, pixels), in float64; `slots` as for `normal_equations`.
+def dense(columns: Sequence[Any], slots: tuple[tuple[int, ...], ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Jacobian (pixels, channels, parameters) and residual (pixels, channels) in float64; `slots` as for `normal_equations`."""
+    *derivatives, residual = (np.asarray(column, float).T for column in columns)
+    jacobian = np.zeros((*residual.shape, sum(len(at) for at in slots)))
+    for derivative, at in zip(derivatives, slots, strict=True):
+        for channel in range(residual.shape[1]):
+            jacobian[:, channel, at[channel % len(at)]] = derivative[:, channel]
+    return jacobian, residual
 
-    By pixels, not by residuals: errors of the channels of one pixel are of the same light paths, and alike.
-    """
-    *derivatives, residual = (np.asarray(column, float) for column in columns)
-    parts = [column * residual for column in derivatives]
-    return np.concatenate([part if len(at) > 1 else part.sum(0, keepdims=True) for part, at in zip(parts, slots, strict=True)])
 
-
-def normal_equations(products: Float[Array, "c k k"] | np.ndarray, slots: tuple[tuple[int, ...], ...], xp: Any = jnp) -> Normal:
+def normal_equations(products: Float[Array, "c k k"] | np.ndarray, slots: tuple[tuple[int, ...], ...]) -> Normal:
     """Half the sum of squares, its gradient and J^T J; `slots` are the places of each field's entries in the vector of parameters."""
     channels = len(products)
     size = sum(len(s) for s in slots)
@@ -66,9 +66,9 @@ def normal_equations(products: Float[Array, "c k k"] | np.ndarray, slots: tuple[
     entry = np.zeros((len(slots), channels, size))
     for k, at in enumerate(slots):
         entry[k, np.arange(channels), np.array(at)] = 1.0
-    gram = xp.einsum("kci,ckl,lcj->ij", entry, products[:, :-1, :-1], entry)
-    gradient = xp.einsum("kci,ck->i", entry, products[:, :-1, -1])
-    return 0.5 * xp.sum(products[:, -1, -1]), (gradient, gram)
+    gram = jnp.einsum("kci,ckl,lcj->ij", entry, products[:, :-1, :-1], entry)
+    gradient = jnp.einsum("kci,ck->i", entry, products[:, :-1, -1])
+    return 0.5 * jnp.sum(products[:, -1, -1]), (gradient, gram)
 
 
 class _State(eqx.Module):
@@ -103,22 +103,23 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):
         n = y.size
-        # Of NumPy: nothing here is worth a compiler's time.
+        # Numbers of NumPy, put on the device: nothing here is worth a compiler's time.
         zero = np.zeros(())
         empty = self._info(zero, np.zeros(n), np.eye(n))
         trust = np.asarray(options.get("trust", 1.0), float)
+        search = jax.tree.map(lambda a: np.zeros(a.shape, a.dtype), jax.eval_shape(self.search.init, y, empty))
         state = _State(
             first=np.array(True),
             y_eval=y,
             loss=zero,
             gradient=np.zeros(n),
             gram=np.eye(n),
-            search=eqx.tree_at(lambda s: s.step_size, self.search.init(y, empty), trust),
+            search=eqx.tree_at(lambda s: s.step_size, search, trust),
             step_size=trust,
             done=np.array(False),
             result=optx.RESULTS.successful,
         )
-        return jax.tree.map(jnp.asarray, state)
+        return jax.device_put(state)
 
     def step(self, fn, y, args, options, state, tags):
         lower, upper = options["lower"], options["upper"]

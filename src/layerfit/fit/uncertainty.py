@@ -1,7 +1,6 @@
 """What the data determine: sigmas, correlations, and the directions in which the parameters can move without being seen."""
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -39,16 +38,20 @@ class Uncertainty:
         return self.covariance / scale[:, None] / scale[None, :]
 
 
-def estimate(
-    gram: np.ndarray, held: np.ndarray, residuals: int, scatter: np.ndarray, groups: Sequence[tuple[np.ndarray, np.ndarray]]
-) -> Uncertainty:
+def estimate(gram: np.ndarray, held: np.ndarray, jacobian: np.ndarray, residual: np.ndarray, part: np.ndarray) -> Uncertainty:
     """Covariance of the parameters that are not held on a bound.
 
-    The gradients of the pixels scatter as their errors do, whatever the weights expected: `scatter`, the sum of their products, between two
-    inverses of J^T J (Huber 1967; White 1980), over the degrees of freedom. That takes pixels as independent. Systematic misfit,
-    which a closed form always has, is alike in neighbours, and pulls parts of the image apart: a jackknife over `groups` of (gradient,
-    J^T J), one Newton step each, widens what it finds to be wider than chance makes it.
+    `jacobian` (pixels, channels, parameters) and `residual` (pixels, channels) are weighted; pixels that do not count have `part` -1. The
+    gradients of the pixels scatter as their errors do, whatever the weights expected: the sum of their products, between two
+    inverses of J^T J (Huber 1967; White 1980), over the degrees of freedom. By pixels, not by residuals: errors of the channels of one
+    pixel are of the same light paths, and alike. That takes pixels as independent. Systematic misfit, which a closed form always has, is
+    alike in neighbours, and pulls parts of the image apart: a jackknife over the parts, `part` (pixels,) of `GROUPS`, one Newton
+    step each, widens what it finds to be wider than chance makes it.
     """
+    gradients = np.einsum("pci,pc->pi", jacobian, residual)
+    scatter = gradients.T @ gradients
+    residuals = int(np.sum(part >= 0)) * residual.shape[1]
+    groups = [_normal(jacobian[part == k], gradients[part == k]) for k in range(GROUPS)]
     n = len(gram)
     free = np.flatnonzero(~held)
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
@@ -68,12 +71,18 @@ def estimate(
             blind.append(full)
         freedom = residuals / max(residuals - len(usable), 1)
         spread = freedom * _sandwich(values, vectors, scatter[at] / unit) / unit
-        moves = np.array([_newton(gram[at] - part_gram[at], -part[usable]) for part, part_gram in groups])
+        moves = np.array([newton(gram - part_gram, held, part)[usable] for part, part_gram in groups])
         apart = (len(groups) - 1) / max(len(groups), 1) * np.sum((moves - moves.mean(0)) ** 2, 0)
         ratio = apart / np.maximum(np.diag(spread), 1e-300)
         factor = np.sqrt(np.maximum(ratio - (CHANCE - 1.0), 1.0))
         covariance[at] = spread * np.outer(factor, factor)
     return Uncertainty(covariance, blind)
+
+
+def _normal(jacobian: np.ndarray, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient and J^T J of some pixels."""
+    rows = jacobian.reshape(-1, jacobian.shape[-1])
+    return gradients.sum(0), rows.T @ rows
 
 
 def _sandwich(values: np.ndarray, vectors: np.ndarray, scatter: np.ndarray) -> np.ndarray:
@@ -88,10 +97,15 @@ def _sandwich(values: np.ndarray, vectors: np.ndarray, scatter: np.ndarray) -> n
     return inverse @ inside @ inverse.T
 
 
-def _newton(gram: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    scaled = gram * np.outer(scale, scale) + 1e-9 * np.eye(len(gram))
-    return -scale * np.linalg.solve(scaled, gradient * scale)
+def newton(gram: np.ndarray, held: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """(J^T J)^-1 times gradients (..., parameters), along what the data see; parameters that are `held` stay."""
+    diagonal = np.diag(gram)
+    still = held | (diagonal <= 1e-24 * diagonal.max())
+    scale = np.where(still, 0.0, 1.0 / np.sqrt(np.where(still, 1.0, diagonal)))
+    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
+    seen = values >= BLIND
+    inverse = vectors[:, seen] / values[seen] @ vectors[:, seen].T
+    return (gradient * scale) @ inverse * scale
 
 
 def in_words(direction: np.ndarray, free: Parametrisation, scale: np.ndarray) -> tuple[dict[str, float], str]:

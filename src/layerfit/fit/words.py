@@ -12,6 +12,9 @@ SIGMA = (
 )
 """What the sigmas are of."""
 
+WHOLE_SIGMA = "of noise and scatter, and of what the form of the model gets wrong by a random walk at this material"
+"""The same where that was measured."""
+
 NONE = "\N{EN DASH}"
 """In place of a number that there is none of."""
 
@@ -34,12 +37,13 @@ def parameters(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
 def _line(name: str, row: Mapping[str, Any]) -> str:
     value, sigma = measured(row["value"], row["sigma"])
     notes = [f"start {number(row['start'])}"] if "start" in row else []
+    notes += [f"corrected {measured(row['corrected'], row['sigma'])[0]}"] if "corrected" in row else []
     return f"    {name + ':':<26} {value} +/- {sigma}{_unit(row, ' ')}  ({', '.join([*notes, *states(row)])})"
 
 
 def table(rows: Mapping[str, Mapping[str, Any]]) -> str:
     """The same as an HTML table."""
-    heads = "".join(f"<th>{head}</th>" for head in ("parameter", "value", "sigma", "unit", "start", ""))
+    heads = "".join(f"<th>{head}</th>" for head in ("parameter", "value", "sigma", "unit", "corrected", "start", ""))
     return f"<table><tr>{heads}</tr>{''.join(_row(name, row) for name, row in rows.items())}</table>"
 
 
@@ -47,7 +51,8 @@ def _row(name: str, row: Mapping[str, Any]) -> str:
     value, sigma = measured(row["value"], row["sigma"])
     cells = f"<th>{html.escape(name)}</th><td>{value}</td><td>&plusmn; {sigma}</td><td>{html.escape(_unit(row))}</td>"
     start = number(row["start"]) if "start" in row else ""
-    return f"<tr>{cells}<td class=soft>{start}</td><td>{html.escape(', '.join(states(row)))}</td></tr>"
+    corrected = measured(row["corrected"], row["sigma"])[0] if "corrected" in row else ""
+    return f"<tr>{cells}<td>{corrected}</td><td class=soft>{start}</td><td>{html.escape(', '.join(states(row)))}</td></tr>"
 
 
 def _unit(row: Mapping[str, Any], before: str = "") -> str:

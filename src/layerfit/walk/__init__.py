@@ -7,5 +7,5 @@ many threads share the work.
 """
 
 from ._interface import Scattered as Scattered, scatter as scatter
-from ._material import Haze as Haze, Interface as Interface, check as check
-from ._walk import Estimate as Estimate, top_lobe as top_lobe, walk as walk, walk_rows as walk_rows
+from ._material import Haze as Haze, Interface as Interface, check as check, hazes as hazes
+from ._walk import Estimate as Estimate, begin as begin, top_lobe as top_lobe, walk as walk, walk_rows as walk_rows

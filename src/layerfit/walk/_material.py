@@ -97,6 +97,12 @@ def read(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> Materi
     return Material(tuple(boundaries), tuple(media), tuple(_relative(b, above) for b in bases), len(channels), interface)
 
 
+def hazes(stack: Stack) -> dict[str, Haze]:
+    """The coats of a material that scatter, as the walk knows them."""
+    scatters = [coat for coat in stack.layers if coat.tau_s is not None]
+    return {coat.name: Haze(coat.tau_s, 0.0 if coat.g is None else coat.g) for coat in scatters}
+
+
 def _relative(base: Any, above: Any) -> Any:
     """A base of rows under media of indices `above`, row by row: shading functions know no batches."""
     rows = max(x.shape[0] for x in jax.tree.leaves((base, above)))

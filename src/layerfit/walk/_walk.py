@@ -4,14 +4,13 @@ import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._compiled import OPTIONS, fusion_emitters
+from .._compiled import Compiled, fusion_emitters
 from ..stack import Stack
 from ._material import Haze, Interface, Material, read
 from ._particle import Tally, start, step
@@ -76,12 +75,15 @@ def walk_rows(
     filled = -(-row.size // LANES) * LANES
     row, lane = (np.concatenate([x, x[:1].repeat(filled - x.size)]) for x in (row, lane))
 
-    def group(first: int) -> Any:
+    def arguments(first: int) -> Any:
         of = slice(first, first + LANES)
         take = lambda x: x[row[of] if x.shape[0] > 1 else np.zeros(LANES, int)]  # noqa: E731
-        inputs = jax.tree.map(take, (material, wi, wo))
-        return jax.tree.map(np.asarray, _run(*inputs, lane[of], np.uint32(seed), np.uint32(per_lane)))
+        return *jax.tree.map(take, (material, wi, wo)), lane[of], np.uint32(seed), np.uint32(per_lane)
 
+    def group(first: int) -> Any:
+        return jax.tree.map(np.asarray, _run(*arguments(first)))
+
+    _run.begin(*arguments(0))  # once: threads would do it each
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         tallies = list(pool.map(group, range(0, filled, LANES)))
     tally = jax.tree.map(lambda *x: np.concatenate(x)[: rows * lanes_per_row].reshape(rows, -1).sum(1, dtype=float), *tallies)
@@ -90,11 +92,7 @@ def walk_rows(
     return Estimate(mean, np.sqrt(np.maximum(square - mean * mean, 0.0) / (count - 1)))
 
 
-# Compiled for speed whatever the process is set to: its loop is long, its text short. Functions under `jax.jit` stay calls, whose results
-# are computed once. Inlined, XLA makes a loop for each number of a particle, and in each does all again that it can do cheaply: eight times
-# the work, most of it random numbers.
-@partial(jax.jit, compiler_options=OPTIONS | {"xla_backend_optimization_level": 3} | fusion_emitters(newer=True))
-def _run(material: Material, wi: jax.Array, wo: jax.Array, lane: jax.Array, seed: jax.Array, paths: jax.Array) -> Tally:
+def _walked(material: Material, wi: jax.Array, wo: jax.Array, lane: jax.Array, seed: jax.Array, paths: jax.Array) -> Tally:
     """Walk `paths` paths in every lane. Leaves (lanes,), directions (lanes, 3)."""
     light, eye = ((w[:, 0], w[:, 1], w[:, 2]) for w in (wi, wo))
     particle = start(material, eye, jnp.zeros_like(lane))
@@ -105,6 +103,19 @@ def _run(material: Material, wi: jax.Array, wo: jax.Array, lane: jax.Array, seed
         return turn(material, light, eye, lane, seed, paths, *state)
 
     return jax.lax.while_loop(lambda state: jnp.any(state[0].path < paths), body, (particle, tally))[1]
+
+
+# Functions under `jax.jit` stay calls, whose results are computed once. Inlined, XLA makes a loop for each number of a particle, and in
+# each does all again that it can do cheaply: eight times the work, most of it random numbers.
+_run = Compiled(_walked, **fusion_emitters(newer=True))
+
+
+def begin(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
+    """Have the walk through materials of this structure compiled, while other work goes on."""
+    rows = jax.tree.map(lambda x: np.asarray(x, np.float32)[None], (stack, dict(haze)))
+    lanes = lambda *shape: jax.ShapeDtypeStruct((LANES, *shape), np.float32)  # noqa: E731
+    material = jax.tree.map(lambda x: lanes(*np.shape(x)[1:]), read(rows[0], interface, rows[1]))
+    _run.begin(material, lanes(3), lanes(3), jax.ShapeDtypeStruct((LANES,), np.uint32), np.uint32(0), np.uint32(0))
 
 
 def top_lobe(stack: Stack, wi: Any, wo: Any) -> np.ndarray:

@@ -1,0 +1,134 @@
+"""What the form of the model gets wrong, as an error of the fitted parameters.
+
+No noise of the image tells of it, and no residual: a fit hides it in its parameters. The random walk does: at the fitted material it gives
+what light really does between the layers, and the difference to the form, seen through the derivatives of the fit, is the
+step from the fitted parameters to those that an exact form would have been fitted with.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .. import walk
+from .._compiled import Compiled
+from ..capture.load import AnyView
+from ..capture.samples import Samples
+from ..forms.precise import Precise
+from ..render import predict
+from ..stack import IN_TIME, Stack
+from .residuals import scaled
+from .uncertainty import newton
+
+PAIRS = 512
+"""Pixels, drawn by how much they say of the parameters, at which the walk is asked: one light sample of each."""
+
+PATHS = 2000
+"""Of the walk, for each of them: its noise then stays below that of the draw."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Discrepancy:
+    """What an exact form would do to a fit, in the coordinates of the fit; both (parameters,)."""
+
+    step: np.ndarray
+    """From the fitted vector to where it would be."""
+    error: np.ndarray
+    """Standard error of that: few pixels, few paths."""
+
+
+def unmeasured(stack: Stack) -> str | None:
+    """Why the random walk cannot tell the form's error for a material; None where it can, or where there is none."""
+    if not stack.layers:
+        return None
+    if any(kind.grows(stack.layers) for kind in IN_TIME):
+        return "the random walk is through coats; this material changes from place to place"
+    if any(np.ndim(coat.tau_s) for coat in stack.layers):
+        return "the random walk scatters all channels alike"
+    try:
+        walk.check(stack, interface(stack), {})
+    except ValueError as refusal:
+        return str(refusal)
+    return None
+
+
+def interface(stack: Stack) -> Any:
+    """What rough boundaries do to light in a material's form."""
+    return stack.form.interface if isinstance(stack.form, Precise) else "single"
+
+
+def begin(stack: Stack) -> None:
+    """Have what `measure` needs compiled, while other work goes on."""
+    if stack.layers and not unmeasured(stack):
+        walk.begin(stack, interface(stack), walk.hazes(stack))
+
+
+def measure(
+    stack: Stack,
+    views: Sequence[AnyView],
+    samples: Sequence[Samples],
+    place: tuple[np.ndarray, np.ndarray],
+    jacobian: np.ndarray,
+    inverse_sigma: np.ndarray,
+    gram: np.ndarray,
+    held: np.ndarray,
+    seed: int,
+) -> Discrepancy:
+    """Ask the random walk what the form of a fitted material is off by, and the fit what that makes of its parameters.
+
+    `place` has the reference and the pixel of each row of `jacobian` (rows, channels, parameters) and `inverse_sigma` (rows, channels), -1
+    for rows that do not count; `gram` is J^T J, and parameters that are `held` stay. A bare surface has no error: it is exact.
+    """
+    if not stack.layers:
+        return Discrepancy(np.zeros(len(gram)), np.zeros(len(gram)))
+    rng = np.random.default_rng(seed)
+    chance = _chance(jacobian, gram, held, place[0] >= 0)
+    drawn = rng.choice(len(chance), PAIRS, p=chance)
+    off = np.zeros((PAIRS, 3))
+    for k, (view, seen) in enumerate(zip(views, samples, strict=True)):
+        here = place[0][drawn] == k
+        if here.any():
+            off[here] = _off(scaled(stack, view.scales(stack)), seen, place[1][drawn[here]], rng)
+    pull = np.einsum("pci,pc->pi", jacobian[drawn], off * inverse_sigma[drawn]) / chance[drawn, None]
+    steps = newton(gram, held, pull)
+    return Discrepancy(steps.mean(0), steps.std(0, ddof=1) / np.sqrt(PAIRS))
+
+
+def _chance(jacobian: np.ndarray, gram: np.ndarray, held: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Of each pixel to be drawn: half evenly, half by its leverage, its part in what determines the parameters."""
+    rows = jacobian.reshape(-1, jacobian.shape[-1])
+    leverage = np.sum(rows * newton(gram, held, rows), -1).reshape(len(jacobian), -1).sum(-1)
+    leverage = np.where(counts, np.maximum(leverage, 0.0), 0.0)
+    return 0.5 * counts / counts.sum() + 0.5 * leverage / leverage.sum()
+
+
+def _off(stack: Stack, samples: Samples, pixels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Radiance of the form less that of the walk, (pixels, 3): of one light sample each, in place of the sum over all."""
+    bright = samples.weight[pixels].sum(-1)
+    chance = bright / bright.sum(-1, keepdims=True)
+    light = np.argmax(np.cumsum(chance, -1) > rng.random((len(pixels), 1)), -1)
+    each = np.arange(len(pixels))
+    wi, wo = samples.wi[pixels, light], samples.wo[pixels]
+    form = predict(stack, wi[:, None], wo, np.ones((len(pixels), 1, 3), np.float32))
+    rows = jax.tree.map(lambda x: np.asarray(x, np.float32)[None], (stack, walk.hazes(stack)))
+    walked = walk.walk_rows(rows[0], wi, wo, paths=PATHS, seed=0, interface=interface(stack), haze=rows[1])
+    weight = samples.weight[pixels, light] / chance[each, light, None]
+    return (form - _top(stack, wi, wo) - walked.mean) * weight
+
+
+def _lobe(coat: Any, wi: Any, wo: Any) -> Any:
+    return jax.vmap(lambda i, o: jnp.broadcast_to(coat.evaluate(i, o), (3,)))(wi, wo)
+
+
+_compiled_lobe = Compiled(_lobe, optimise=1)
+
+
+def _top(stack: Stack, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """BRDF of the top interface alone, (n, 3): the same in every form and in the walk."""
+    size = PAIRS - len(wi)
+    wi, wo = (np.pad(w, ((0, size), (0, 0)), "edge") for w in (wi, wo))
+    with jax.enable_x64(False):
+        return np.asarray(_compiled_lobe(stack.astype(np.float32).layers[0], wi, wo))[: PAIRS - size]

@@ -1,0 +1,99 @@
+"""What the form of the model does to fitted parameters, told by the random walk."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from helpers import COPPER, sphere_view
+from layerfit.capture.samples import View
+from layerfit.fit.discrepancy import unmeasured
+from layerfit.fit.fit import fit
+from layerfit.fit.result import parameters, to_json
+from layerfit.forms.corrected import Corrected
+from layerfit.layers import Coat, Patina
+from layerfit.stack import Stack
+from layerfit.surfaces import Conductor
+from layerfit.walk import top_lobe, walk_rows
+
+TRUTH = {"coat.alpha": 0.12, "coat.eta": 1.5, "coat.tau": [0.08, 0.25, 0.7], "base.alpha": 0.2}
+MATERIAL = Stack((Coat(alpha=0.12, eta=1.5, tau=TRUTH["coat.tau"]),), Conductor(alpha=0.2, **COPPER), Corrected())
+START = Stack((Coat(alpha=0.2, eta=1.4, tau=[0.3, 0.3, 0.3]),), Conductor(alpha=0.3, **COPPER), Corrected())
+
+
+def walked(view: View, stack: Stack, paths: int) -> np.ndarray:
+    """Radiance at the pixels of a view by the random walk, (pixels, 3)."""
+    samples = view.samples()
+    wi, wo = samples.wi[:, 0], samples.wo
+    rows = dataclasses.replace(stack, form=Corrected())
+    coat = dataclasses.replace(
+        rows.layers[0], tau=np.float32([TRUTH["coat.tau"]]), alpha=np.float32([0.12]), eta=np.float32([1.5])
+    )
+    base = Conductor(**{k: np.float32([v]) for k, v in {"alpha": 0.2, **COPPER}.items()})
+    below = walk_rows(Stack((coat,), base), wi, wo, paths=paths, seed=5).mean
+    top = np.concatenate([top_lobe(stack, i, o[None]) for i, o in zip(wi, wo, strict=True)])
+    return ((top + below) * samples.weight[:, 0]).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    view = sphere_view(MATERIAL, tmp_path_factory.mktemp("walk"), 32)
+    view = dataclasses.replace(view, target=walked(view, MATERIAL, 8000))
+    return fit([view], START, free=tuple(TRUTH), starts=2, model_error=True)
+
+
+def test_a_value_without_the_error_of_its_form_is_nearer_to_the_truth(result):
+    rows = parameters(result)
+    scale = {name: np.maximum(np.abs(wanted), 0.3 if name == "coat.tau" else 0.0) for name, wanted in TRUTH.items()}
+    off = {
+        key: np.concatenate([np.atleast_1d(np.abs(np.subtract(rows[n][key], TRUTH[n])) / scale[n]) for n in TRUTH])
+        for key in ("value", "corrected")
+    }
+    assert np.median(off["value"]) > 0.02, "there is something to correct"
+    assert np.median(off["corrected"]) < 0.4 * np.median(off["value"])
+    assert np.max(off["corrected"]) < 0.6 * np.max(off["value"])
+
+
+def test_the_truth_is_within_three_sigma(result):
+    for name, row in parameters(result).items():
+        pull = np.abs(np.subtract(row["value"], TRUTH[name])) / row["sigma"]
+        assert np.all(pull < 3.0), name
+        parts = np.hypot(row["sigma_noise"], row["sigma_model"])
+        np.testing.assert_allclose(row["sigma"], parts, rtol=2e-3)
+        assert np.all(np.asarray(row["sigma_model"]) > np.asarray(row["sigma_noise"])), "noise is not what makes it wrong"
+
+
+def test_it_is_said_what_a_sigma_is_of(result):
+    document = to_json(result, {}, None, {}, "preset.json")
+    assert "what the form of the model gets wrong" in document["sigma_is"]
+    json.dumps(document, allow_nan=False)
+    assert "corrected" in repr(result)
+    assert "corrected" in result._repr_html_()
+
+
+def test_a_bare_surface_has_no_error(tmp_path):
+    stack = Stack((), Conductor(alpha=0.3, **COPPER))
+    result = fit(
+        [sphere_view(stack, tmp_path, 32)],
+        Stack((), Conductor(alpha=0.2, **COPPER)),
+        free=["base.alpha"],
+        starts=1,
+        model_error=True,
+    )
+    row = parameters(result)["base.alpha"]
+    assert (row["sigma_model"], row["corrected"]) == (0.0, row["value"])
+    assert not result.notes
+
+
+@pytest.mark.parametrize(
+    ("stack", "why"),
+    [
+        (Stack((Patina(),), Conductor()), "place to place"),
+        (Stack((Coat(masking="vcavity"),), Conductor()), "V-cavities"),
+        (Stack((Coat(tau_s=[0.1, 0.2, 0.3]),), Conductor()), "all channels alike"),
+        (Stack((Coat(film_nm=200.0, film_eta=2.0),), Conductor()), "thin film"),
+    ],
+)
+def test_what_the_walk_does_not_know_is_said(stack, why):
+    assert why in (unmeasured(stack) or "")
