@@ -11,7 +11,7 @@ from layerfit.errors import InputError
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.layers import Coat
-from layerfit.optics.flakes import flake_tilt, into_facet, kept_tilt, tilted_normal
+from layerfit.optics.flakes import circle, exponential, flake_tilt, into_facet, kept_tilt, tilted_normal
 from layerfit.preset import preset_of, stack_of
 from layerfit.render import brdf
 from layerfit.shader.export import print_material
@@ -50,6 +50,17 @@ def test_tilts_have_the_spread_that_they_say():
     tilt = np.asarray(jax.vmap(lambda w: flake_tilt(w, jnp.asarray(10.0), jnp.asarray(0.3), jnp.uint32(1)))(jnp.asarray(uv)))
     np.testing.assert_allclose(tilt.mean(0), 0.0, atol=DRAWS * 0.3 / np.sqrt(2 * MANY))
     assert np.mean(np.sum(tilt**2, 1)) == pytest.approx(0.09, rel=DRAWS / np.sqrt(MANY))
+
+
+@pytest.mark.parametrize(("dtype", "error"), [(np.float64, 1e-15), (np.float32, 2e-7)])
+def test_what_tilts_are_made_of_has_its_digits(dtype, error):
+    ends = 2.0 ** -np.arange(1.0, 24.0)
+    u = np.concatenate([np.linspace(0.0, 1.0, 4097)[1:-1], ends, 1.0 - ends]).astype(dtype)
+    exact = u.astype(float)
+    points = np.stack([np.cos(2.0 * np.pi * exact), np.sin(2.0 * np.pi * exact)], -1)
+    np.testing.assert_allclose(jax.vmap(circle)(jnp.asarray(u)), points, atol=error)
+    found = jax.vmap(exponential)(jnp.asarray(u), jnp.asarray(1.0 - u))
+    np.testing.assert_allclose(found, -np.log1p(-exact), rtol=error)
 
 
 def test_half_a_turn_takes_the_normal_of_a_flake_to_the_vertical():
@@ -148,8 +159,8 @@ def test_the_shader_of_elek_draws_the_same_flakes(gl):
 
 
 NARROW = {
-    f"{alpha}, {name}": Stack(coats, Flakes(alpha=alpha, lost=lost, **COPPER), form)
-    for alpha in (0.01, 0.02, 0.035)
+    f"{alpha}, {sigma}, {name}": Stack(coats, Flakes(alpha=alpha, sigma=sigma, lost=lost, **COPPER), form)
+    for alpha, sigma in ((0.002, 1.0), (0.002, 0.2), (0.01, 0.2), (0.035, 0.2))
     for name, coats, lost, form in (
         ("bare", (), "roughness", Corrected()),
         ("coated", (CLEAR,), "roughness", Corrected()),

@@ -64,16 +64,16 @@ const Coat lf_oxide = Coat(
 const Interface lf_oxide_interface = Interface(
     0.046419468,                                                // tilt: turn of the mean facet towards a grazing direction
     0.10031511,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.03934908, 0.026510041, 0.032650657, -0.022436418),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.03934908, 0.026510041, 0.032650657, -0.022436477),  // passed: energy that passes, beyond the closed form: four coefficients
     vec4(-0.0328139, 0.028090157, 0.009836316, -0.011298083),   // passed_high: the other four, of higher powers
-    vec4(1.0975682, -0.15713176, 0.12942672, -0.04542494),      // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.057476044, 0.07574177, 0.00493145, -0.026345253),   // bend_high: 
-    vec4(0.66335785, -0.2969888, 0.117569864, -0.015427589),    // spread: width of a lobe seen through it
-    vec4(-0.1550864, 0.123889685, 0.053566456, -0.060359955),   // spread_high: 
-    vec4(1.0968367, -0.1920546, 0.17082345, -0.050065517),      // path: mean path over that of the refracted direction
-    vec4(-0.11193919, 0.12059212, 0.024900675, -0.049715042),   // path_high: 
-    vec4(0.23706682, -0.47861528, 0.46576566, -0.08105123),     // theta: scale of the path's distribution
-    vec4(-0.3500735, 0.15206563, 0.12560435, -0.006695181)      // theta_high: 
+    vec4(1.0975682, -0.15713224, 0.12942672, -0.04542494),      // bend: sine of the refracted light over that at a smooth interface
+    vec4(-0.057476997, 0.07574177, 0.00493145, -0.026343346),   // bend_high: 
+    vec4(0.6633578, -0.2969889, 0.117569864, -0.015428543),     // spread: width of a lobe seen through it
+    vec4(-0.15508735, 0.123889685, 0.053566456, -0.060361385),  // spread_high: 
+    vec4(1.0968367, -0.19205412, 0.17082345, -0.050070286),     // path: mean path over that of the refracted direction
+    vec4(-0.11193919, 0.120594025, 0.024900675, -0.04971552),   // path_high: 
+    vec4(0.23706682, -0.47861528, 0.46576566, -0.08105126),     // theta: scale of the path's distribution
+    vec4(-0.3500735, 0.1520657, 0.12560432, -0.0066952407)      // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -83,25 +83,25 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.0030880119, 0.033689816, 0.20722334),        // c0: coefficients of the powers of the curves' argument
-    vec3(0.00033428543, 0.001051194, -0.01276559),      // c1: 
-    vec3(-4.8076967e-05, -0.0013245754, -0.00893499),   // c2: 
-    vec3(0.00026468094, 0.0013033822, 7.110834e-05),    // c3: 
-    vec3(-0.00032590702, -0.004242532, -0.028619945),   // c4: 
-    vec3(-0.00042954087, -0.0029874444, -0.009333849),  // c5: 
-    vec3(0.00020619016, 0.0022733435, 0.013567805),     // c6: 
-    vec3(0.00017652102, 0.001033932, 0.003203392)       // c7: 
+    vec3(0.0030880119, 0.033689808, 0.20722334),       // c0: coefficients of the powers of the curves' argument
+    vec3(0.00033428497, 0.0010511866, -0.0127656795),  // c1: 
+    vec3(-4.8079528e-05, -0.001324553, -0.008934662),  // c2: 
+    vec3(0.00026468746, 0.0013034716, 7.2062016e-05),  // c3: 
+    vec3(-0.00032590423, -0.004242532, -0.02862066),   // c4: 
+    vec3(-0.0004295539, -0.0029876828, -0.009335279),  // c5: 
+    vec3(0.0002061855, 0.002273336, 0.013568103),      // c6: 
+    vec3(0.00017652847, 0.0010340214, 0.0032043457)    // c7: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.15604745, 0.3281166, 0.6784849),             // c0: coefficients of the powers of the curves' argument
-    vec3(0.0012289584, -0.009724386, -0.042870805),     // c1: 
-    vec3(-0.004686177, -0.018907994, -0.033713818),     // c2: 
-    vec3(-0.008841932, -0.014172494, -0.025995731),     // c3: 
-    vec3(-0.008658469, -0.008200884, -0.017255783),     // c4: 
-    vec3(-0.00036883354, -0.001180172, -0.0058374405),  // c5: 
-    vec3(0.00015226007, 0.00038838387, 0.00034618378),  // c6: 
-    vec3(-0.00084489584, 0.00066280365, 0.0036976337)   // c7: 
+    vec3(0.15604743, 0.32811666, 0.678485),              // c0: coefficients of the powers of the curves' argument
+    vec3(0.001229018, -0.009724639, -0.042871),          // c1: 
+    vec3(-0.0046860278, -0.018908054, -0.033714473),     // c2: 
+    vec3(-0.008842051, -0.014170766, -0.025995493),      // c3: 
+    vec3(-0.008658707, -0.0082012415, -0.017253399),     // c4: 
+    vec3(-0.00036931038, -0.0011827946, -0.0058398247),  // c5: 
+    vec3(0.0001526177, 0.00038856268, 0.00034487247),    // c6: 
+    vec3(-0.00084525347, 0.0006644726, 0.0036985874)     // c7: 
 );
 
 // log(1 + x) without the cancellation near 0.

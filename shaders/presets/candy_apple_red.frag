@@ -66,20 +66,6 @@ const Flakes lf_flakes = Flakes(
     0.0                                  // seed: whole number; another one, other flakes
 );
 
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
-    float s = x / (2.0 + x);
-    float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
-
 // Error function: a series in x^2 below 1, exp(-x^2) times a polynomial in 1 / (1 + x / 2) above (relative error 1.3e-7).
 float lf_erf(float x) {
     float a = abs(x);
@@ -99,7 +85,7 @@ vec3 lf_erf(vec3 x) {
 // Part of the tilt of flakes that is still drawn flake by flake: 1 near by, 1/2 at `half_distance`, 0 far off.
 float lf_kept_tilt(float distance, float half_distance) {
     float ratio = distance / half_distance;
-    return 1.0 / (1.0 + ratio * ratio);
+    return 1.0 / (1.0 + abs(ratio * ratio));
 }
 
 // Three hashed words of three words (Jarzynski and Olano 2020, listing 5).
@@ -123,17 +109,69 @@ uvec3 lf_hash_cell(vec2 cell, uint seed) {
     return lf_pcg3d(uvec3(i.x, i.y, seed));
 }
 
+// -log(1 - u) for u in (0, 1), with all digits at both ends; `complement` is 1 - u with its own.
+float lf_exponential(float u, float complement) {
+    bool small = complement < 1.5258789e-05;
+    float x = small ? complement * 65536.0 : complement;
+    float halvings = small ? 16.0 : 0.0;
+    small = x < 0.00390625;
+    x = small ? x * 256.0 : x;
+    halvings = small ? halvings + 8.0 : halvings;
+    small = x < 0.0625;
+    x = small ? x * 16.0 : x;
+    halvings = small ? halvings + 4.0 : halvings;
+    small = x < 0.25;
+    x = small ? x * 4.0 : x;
+    halvings = small ? halvings + 2.0 : halvings;
+    small = x < 0.5;
+    x = small ? x * 2.0 : x;
+    halvings = small ? halvings + 1.0 : halvings;
+    small = x < 0.70710677;
+    x = small ? x * 2.0 : x;
+    halvings = small ? halvings + 1.0 : halvings;
+    bool near = u < 0.25;
+    float s = (near ? (-u) : x - 1.0) / (near ? 2.0 - u : x + 1.0);
+    float s2 = s * s;
+    float total = abs(0.0 * s2) + 0.11111111;
+    total = abs(total * s2) + 0.14285715;
+    total = abs(total * s2) + 0.2;
+    total = abs(total * s2) + 0.33333334;
+    total = abs(total * s2) + 1.0;
+    return (near ? 0.0 : abs(halvings * 0.6931472)) - 2.0 * (s * total);
+}
+
+// Point of the unit circle, u turns from (1, 0); u in [0, 1].
+vec2 lf_circle(float u) {
+    float quarter = floor(4.0 * u + 0.5);
+    float x = 6.2831855 * (u - 0.25 * quarter);
+    float x2 = x * x;
+    float total = 1.0 - abs(x2 / 90.0);
+    total = 1.0 - abs(x2 * total / 56.0);
+    total = 1.0 - abs(x2 * total / 30.0);
+    total = 1.0 - abs(x2 * total / 12.0);
+    total = 1.0 - abs(x2 * total / 2.0);
+    float total2 = 1.0 - abs(x2 / 110.0);
+    total2 = 1.0 - abs(x2 * total2 / 72.0);
+    total2 = 1.0 - abs(x2 * total2 / 42.0);
+    total2 = 1.0 - abs(x2 * total2 / 20.0);
+    total2 = 1.0 - abs(x2 * total2 / 6.0);
+    float sine = x * total2;
+    bool odd = quarter == 1.0 || quarter == 3.0;
+    bool left = quarter == 1.0 || quarter == 2.0;
+    bool below = quarter == 2.0 || quarter == 3.0;
+    float across = odd ? sine : total;
+    float along = odd ? total : sine;
+    return vec2(left ? (-across) : across, below ? (-along) : along);
+}
+
 // Tilt of the flake at texture coordinates uv; `per_uv` flakes lie along one unit of them.
 vec2 lf_flake_tilt(vec2 uv, float per_uv, float spread, uint seed) {
     uvec3 bits = lf_hash_cell(floor(uv * per_uv), seed);
     float u = (float(bits.x >> 8u) + 0.5) * 5.9604645e-08;
-    u = min(u, 0.99999994);
     float u2 = (float(~bits.x >> 8u) + 0.5) * 5.9604645e-08;
-    float exponent = u < 0.25 ? lf_log1p(-u) : log(min(u2, 0.99999994));
-    float slope = spread * sqrt(max(-exponent, 0.0));
+    float exponent = lf_exponential(min(u, 0.99999994), min(u2, 0.99999994));
     u = (float(bits.y >> 8u) + 0.5) * 5.9604645e-08;
-    float phi = 6.2831855 * (min(u, 0.99999994) - 0.5);
-    return -slope * vec2(cos(phi), sin(phi));
+    return spread * sqrt(max(exponent, 0.0)) * lf_circle(min(u, 0.99999994));
 }
 
 // Part of the variance of tilts that is not drawn flake by flake: 1 - kept_tilt^2, with its own digits near by.
@@ -330,36 +368,35 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float total = spread + 3.0 * (t * t);
     total = total + 2.0 * (lf_candy.alpha * lf_candy.alpha);
     float width = min(sqrt(max(total, 0.0)), 1.5);
-    float sigma2 = lf_flakes.sigma * lf_flakes.sigma;
-    float alpha2 = width * width - (1.0 - lost) * sigma2;
-    D = lf_tilted_d(h, tilt, sqrt(alpha2));
+    t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
+    float own = t * t;
+    total = spread + 2.0 * (own + lf_candy.alpha * lf_candy.alpha);
+    float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(total, 2.25 - own);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    float lobe = D * V;
+    float lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
     total = spread + 2.0 * (t * t);
     total = total + lf_candy.alpha * lf_candy.alpha;
     width = min(sqrt(max(total, 0.0)), 1.5);
-    sigma2 = lf_flakes.sigma * lf_flakes.sigma;
-    alpha2 = width * width - (1.0 - lost) * sigma2;
-    D = lf_tilted_d(h, tilt, sqrt(alpha2));
+    t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
+    own = t * t;
+    total = spread + (own + lf_candy.alpha * lf_candy.alpha);
+    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(total, 2.25 - own);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    lobe = D * V;
+    lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes = lobe + q * lobes;
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
     total = spread + t * t;
     width = min(sqrt(max(total, 0.0)), 1.5);
-    sigma2 = lf_flakes.sigma * lf_flakes.sigma;
-    alpha2 = width * width - (1.0 - lost) * sigma2;
-    D = lf_tilted_d(h, tilt, sqrt(alpha2));
+    t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
+    own = t * t;
+    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(spread, 2.25 - own);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    lobe = D * V;
+    lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * directional * F2 * lobes;
     return lit ? f2 : vec3(0.0);

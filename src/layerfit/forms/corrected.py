@@ -204,10 +204,19 @@ def _bounced(target: Lobe, below: _Below, options: Corrected) -> Colour:
     spread = _spread(target, below) if options.broaden else None
     lobes: Any = 0.0
     for order in range(max(options.orders, 1), 0, -1):
-        width = target.width if spread is None else _widened(target, order, below, spread)
-        lobe = target.shape(wi, wo, h, width)
+        lobe = _shape(target, wi, wo, h, order, below, spread)
         lobes = lobe / jnp.maximum(1.0 - q, 1e-6) if order == options.orders else lobe + q * lobes
     return below.throughput * below.directional * F * lobes
+
+
+def _shape(target: Lobe, wi: Vec3, wo: Vec3, h: Vec3, order: int, below: _Below, spread: Width | None) -> Any:
+    """The lobe of light that met `target` `order` times; `spread` is what the interfaces passed add to its width."""
+    if spread is None:
+        return target.shape(wi, wo, h, target.width)
+    width = _widened(target, order, below, spread)
+    if WIDTH_POWER[target.distribution] != 2.0:
+        return target.shape(wi, wo, h, width)
+    return target.widened(wi, wo, h, width, _added(target, order, below, spread))
 
 
 def _by_lobes(lobes: Colour, R: Colour, crossing: Crossing, tau: Colour | None) -> Colour:
@@ -267,6 +276,19 @@ def _widened(target: Lobe, order: int, below: _Below, spread: Width) -> Width:
             total = total + (order - 1) * _power(_component(below.spreads[-1][0], axis), p)
         width = jnp.minimum(safe_sqrt(total) if p == 2.0 else safe_power(total, 1.0 / p), WIDEST)
         return width
+
+    return _per_axis([spread], along)
+
+
+def _added(target: Lobe, order: int, below: _Below, spread: Width) -> Width:
+    """What `_widened` adds to the variance of a Gaussian lobe: for those that know a small part of their own."""
+
+    def along(axis: int) -> Scalar:
+        own = _power(_component(target.width, axis), 2.0)
+        total = _component(spread, axis)
+        if order > 1:
+            total = total + (order - 1) * (own + _power(_component(below.spreads[-1][0], axis), 2.0))
+        return jnp.minimum(total, WIDEST * WIDEST - own)
 
     return _per_axis([spread], along)
 

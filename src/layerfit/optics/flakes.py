@@ -14,18 +14,61 @@ from .._types import Scalar, UInt, Vec2, Vec3
 from .hashing import hash_cell, unit
 from .microfacet import beckmann_by_slopes
 
+# A tilt that is off by a millionth moves the lobe of a narrow flake by a part of its width. So tilts are made of sums, products, quotients and
+# roots alone: a driver's logarithm, sine and cosine may be off by 5e-4. And no product goes straight into a sum: some compilers would round
+# both at once, others one by one.
+
+
+def _rounded(product: Scalar) -> Scalar:
+    """A product >= 0 that is rounded before anything is added to it."""
+    return jnp.abs(product)
+
 
 @chunk
 def flake_tilt(uv: Vec2, per_uv: Scalar, spread: Scalar, seed: UInt) -> Vec2:
     """Tilt of the flake at texture coordinates uv; `per_uv` flakes lie along one unit of them."""
     bits = hash_cell(jnp.floor(uv * per_uv), seed)
-    # log(1 - u) by the complement of the bits, since 1 - u would round to 0 for the steepest flakes, but not near 0: drivers' logarithms
-    # lose their digits near 1.
-    u = unit(bits[0], per_uv)
-    exponent = where(u < 0.25, jnp.log1p(-u), jnp.log(unit(~bits[0], per_uv)))
-    slope = spread * safe_sqrt(-exponent)
-    phi = 2.0 * math.pi * (unit(bits[1], per_uv) - 0.5)  # from -pi, where a GPU's sine has its digits
-    return -slope * jnp.stack([jnp.cos(phi), jnp.sin(phi)])
+    # 1 - u by the complement of the bits: it would round to 0 for the steepest flakes.
+    exponent = exponential(unit(bits[0], per_uv), unit(~bits[0], per_uv))
+    return spread * safe_sqrt(exponent) * circle(unit(bits[1], per_uv))
+
+
+@chunk
+def exponential(u: Scalar, complement: Scalar) -> Scalar:
+    """-log(1 - u) for u in (0, 1), with all digits at both ends; `complement` is 1 - u with its own."""
+    x, halvings = complement, jnp.zeros_like(u)
+    for k in (16, 8, 4, 2, 1, 0):
+        small = x < (2.0**-k if k else math.sqrt(0.5))
+        by = max(k, 1)
+        x = where(small, x * 2.0**by, x)
+        halvings = where(small, halvings + by, halvings)
+    near = u < 0.25
+    s = where(near, -u, x - 1.0) / where(near, 2.0 - u, x + 1.0)  # -log x = -2 artanh s, |s| < .172
+    s2, total = s * s, jnp.zeros_like(s)
+    for k in reversed(range(5 if u.dtype == jnp.float32 else 11)):
+        total = _rounded(total * s2) + 1.0 / (2 * k + 1)
+    return where(near, 0.0, _rounded(halvings * math.log(2.0))) - 2.0 * (s * total)  # twice is exact
+
+
+@chunk
+def circle(u: Scalar) -> Vec2:
+    """Point of the unit circle, u turns from (1, 0); u in [0, 1]."""
+    quarter = jnp.floor(4.0 * u + 0.5)
+    x = 2.0 * math.pi * (u - 0.25 * quarter)  # an eighth of a turn at most
+    x2 = x * x
+    cosine, sine = _series(x2, 0), x * _series(x2, 1)
+    odd = (quarter == 1.0) | (quarter == 3.0)
+    left, below = (quarter == 1.0) | (quarter == 2.0), (quarter == 2.0) | (quarter == 3.0)
+    across, along = where(odd, sine, cosine), where(odd, cosine, sine)
+    return jnp.stack([where(left, -across, across), where(below, -along, along)])
+
+
+def _series(x2: Scalar, odd: int) -> Scalar:
+    """cos x, or sin x / x, for |x| < pi / 4: terms that fall, each from the one before."""
+    total = jnp.ones_like(x2)
+    for k in reversed(range(1, 6 if x2.dtype == jnp.float32 else 10)):
+        total = 1.0 - _rounded(x2 * total / ((2 * k + odd) * (2 * k + odd - 1)))
+    return total
 
 
 @chunk
@@ -46,7 +89,7 @@ def tilted_d(h: Vec3, tilt: Vec2, alpha: Scalar) -> Scalar:
 def kept_tilt(distance: Scalar, half_distance: Scalar) -> Scalar:
     """Part of the tilt of flakes that is still drawn flake by flake: 1 near by, 1/2 at `half_distance`, 0 far off."""
     ratio = distance / half_distance
-    return 1.0 / (1.0 + ratio * ratio)
+    return 1.0 / (1.0 + _rounded(ratio * ratio))
 
 
 @chunk
@@ -63,3 +106,13 @@ def into_facet(w: Vec3, n: Vec3) -> Vec3:
     """A direction in a frame whose z is n: half a turn about the vector halfway between n and the normal (0, 0, 1)."""
     m = n + jnp.array([0.0, 0.0, 1.0], n.dtype)
     return m * (dot(w, m) / m[2]) - w
+
+
+@chunk
+def half_into_facet(wi: Vec3, wo: Vec3, tilt: Vec2, n: Vec3) -> Vec3:
+    """`into_facet` of the half vector of two directions, n the normal of that tilt: its small slopes keep their digits where it is near n."""
+    # What the sum has beside the slope of n: all of x and y comes of it, as n itself turns into z. To turn it whole would round by the digits of 1.
+    s = wi + wo
+    beside = jnp.stack([s[0] / s[2] - tilt[0], s[1] / s[2] - tilt[1], jnp.zeros_like(s[2])])
+    turned = s[2] * into_facet(beside, n)
+    return jnp.stack([turned[0], turned[1], dot(s, n)]) / jnp.sqrt(jnp.maximum(dot(s, s), 1e-20))

@@ -8,6 +8,8 @@ from functools import reduce
 from operator import add
 from typing import Any
 
+import jax.numpy as jnp
+
 from .._types import Colour, Scalar, Vec3
 from ..optics.microfacet import Distribution, Width, half_cosine, half_vector
 
@@ -15,6 +17,13 @@ from ..optics.microfacet import Distribution, Width, half_cosine, half_vector
 def variance(width: Width) -> Scalar:
     """alpha^2; of two widths that of their mean, for an isotropic lobe below a coat that has two."""
     return width[0] * width[1] if isinstance(width, tuple) else width * width
+
+
+def widened_variance(own: Scalar, added: Width | None) -> Scalar:
+    """alpha^2 of an isotropic lobe to whose slopes coats add theirs, of two widths that of their mean."""
+    if added is None:
+        return own
+    return jnp.sqrt((own + added[0]) * (own + added[1])) if isinstance(added, tuple) else own + added
 
 
 class Lobe:
@@ -35,6 +44,10 @@ class Lobe:
     def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Any:
         """The rest [1/sr], of this lobe or of one widened to `width`; `h` is the half vector."""
         raise NotImplementedError
+
+    def widened(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, added: Width) -> Any:
+        """The same of a Gaussian lobe that coats have widened to `width`, and its variance by `added`."""
+        return self.shape(wi, wo, h, width)
 
     def energy(self, reflectance: Colour) -> Colour:
         """Part of the light that the lobe sends back, 0 to 1, by its `reflectance`: it scales what goes to and fro below a coat."""

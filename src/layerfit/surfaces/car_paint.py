@@ -18,7 +18,7 @@ from .._types import Colour, Number, Scalar, Vec2, Vec3
 from ..optics.flakes import flake_tilt, kept_tilt, lost_variance, tilted_d
 from ..optics.fresnel import fresnel_schlick
 from ..optics.microfacet import Width, density, v_cavity
-from .base import Lobe, Surface, variance
+from .base import Lobe, Surface, widened_variance
 from .diffuse import TwoParts, kd_param
 from .flakes import half_distance_param, per_uv_param, seed_param
 from .microfacet import alpha_param
@@ -60,16 +60,20 @@ class PaintLobe(Lobe):
     def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
         V = v_cavity(wi, wo)
         if self.sparkle is not None and self.tilt is not None:
-            return self._flake_d(h, self.sparkle, self.tilt, width) * V
+            return self._flake_d(h, self.sparkle, self.tilt, None) * V
         D = density("beckmann", h, self.alpha if width is None else width)
         return D * V
 
-    def _flake_d(self, h: Vec3, sparkle: Scalar, tilt: Tilt, width: Width | None) -> Scalar:
+    def widened(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, added: Width) -> Scalar:
+        if self.sparkle is None or self.tilt is None:
+            return self.shape(wi, wo, h, width)
+        return self._flake_d(h, self.sparkle, self.tilt, added) * v_cavity(wi, wo)
+
+    def _flake_d(self, h: Vec3, sparkle: Scalar, tilt: Tilt, added: Width | None) -> Scalar:
         """Density of the facets of one flake: they lack the part of the spread that its tilt is drawn of."""
         whole = self.alpha * self.alpha
-        spread2 = sparkle * whole
-        alpha2 = whole - spread2 + tilt.lost * spread2 if width is None else variance(width) - (1.0 - tilt.lost) * spread2
-        return tilted_d(h, safe_sqrt(spread2) * tilt.slope, safe_sqrt(alpha2))
+        own = whole * (1.0 - sparkle) + tilt.lost * (sparkle * whole)
+        return tilted_d(h, safe_sqrt(sparkle) * self.alpha * tilt.slope, safe_sqrt(widened_variance(own, added)))
 
 
 def _ks(default: float | None) -> Any:

@@ -9,9 +9,9 @@ from .._chunk import static, where
 from .._fields import choice, layer, param
 from .._place import TANGENT, Place
 from .._types import Colour, Number, Scalar, Vec2, Vec3
-from ..optics.flakes import flake_tilt, into_facet, kept_tilt, lost_variance, tilted_d, tilted_normal
+from ..optics.flakes import flake_tilt, half_into_facet, into_facet, kept_tilt, lost_variance, tilted_d, tilted_normal
 from ..optics.microfacet import Width, density, visibility
-from .base import Lobe, Surface, variance
+from .base import Lobe, Surface, widened_variance
 from .diffuse import Lambert
 from .facet import Metal, metal_eta, metal_k
 from .microfacet import alpha_param
@@ -135,24 +135,27 @@ class FlakeLobe(Lobe):
             width = self.width if width is None else width
             return density("beckmann", h, width) * visibility("smith", "beckmann", wi, wo, width)
         if self.paint.lost == "nothing":
-            return self._in_its_frame(wi, wo, h, self.paint.alpha if width is None else width, self.flake)
-        return self._among_others(wi, wo, h, width, self.flake)
+            return self._in_its_frame(wi, wo, self.paint.alpha if width is None else width, self.flake)
+        return self._among_others(wi, wo, h, self.width, None, self.flake)
 
-    def _among_others(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None, flake: Flake) -> Scalar:
+    def widened(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, added: Width) -> Scalar:
+        if self.flake is None or self.paint.lost == "nothing":
+            return self.shape(wi, wo, h, width)
+        return self._among_others(wi, wo, h, width, added, self.flake)
+
+    def _among_others(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, added: Width | None, flake: Flake) -> Scalar:
         """The lobe about a flake. Flakes hide one another by the slopes of all: the mean over flakes is the lobe seen from afar."""
-        alpha, sigma2 = self.paint.alpha, self.paint.sigma * self.paint.sigma
-        alpha2 = alpha * alpha + flake.lost * sigma2 if width is None else variance(width) - (1.0 - flake.lost) * sigma2
-        D = tilted_d(h, flake.tilt, jnp.sqrt(alpha2))
-        slopes = self.width if width is None else width
-        V = visibility("smith", "beckmann", wi, wo, slopes)
-        return D * V
+        alpha, sigma = self.paint.alpha, self.paint.sigma
+        # Of a flake alone, and what coats add: the width of all flakes, less their spread, would have the digits of that.
+        alpha2 = widened_variance(alpha * alpha + flake.lost * (sigma * sigma), added)
+        return tilted_d(h, flake.tilt, jnp.sqrt(alpha2)) * visibility("smith", "beckmann", wi, wo, width)
 
-    def _in_its_frame(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, flake: Flake) -> Scalar:
+    def _in_its_frame(self, wi: Vec3, wo: Vec3, width: Width, flake: Flake) -> Scalar:
         """The lobe of a surface whose normal is that of the flake (Elek 2010): nothing where either direction is below it."""
         n = tilted_normal(flake.tilt)
         up = jnp.array([0.0, 0.0, 1.0], n.dtype)
         wi_flake, wo_flake = into_facet(wi, n), into_facet(wo, n)
         lit = (wi_flake[2] > 0.0) & (wo_flake[2] > 0.0)
-        D = density("beckmann", into_facet(h, n), width)
+        D = density("beckmann", half_into_facet(wi, wo, flake.tilt, n), width)
         V = visibility("smith", "beckmann", where(lit, wi_flake, up), where(lit, wo_flake, up), width)
         return where(lit, D * V, 0.0)
