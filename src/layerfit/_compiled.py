@@ -89,13 +89,17 @@ class Compiled:
         """Trace a call and have it compiled while other work goes on. Arguments and result are arrays or their shapes."""
         return self._entry(args, static)[1]
 
-    def __call__(self, *args: Any, **static: Any) -> Any:
+    def ready(self, *args: Any, **static: Any) -> Any:
+        """The executable of a call, when it is compiled: a function of the leaves of the arguments."""
         executable = self._entry(args, static)[0]
         if not executable.done():
             start = time.perf_counter()
             executable.result()
             CLOCK.compile_s += time.perf_counter() - start
-        return executable.result()(*jax.tree.leaves(args))
+        return executable.result()
+
+    def __call__(self, *args: Any, **static: Any) -> Any:
+        return self.ready(*args, **static)(*jax.tree.leaves(args))
 
     def _entry(self, args: Any, static: dict[str, Any]) -> tuple[Future[Any], Any]:
         leaves, structure = jax.tree.flatten(args)

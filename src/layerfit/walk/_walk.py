@@ -83,7 +83,7 @@ def walk_rows(
     def group(first: int) -> Any:
         return jax.tree.map(np.asarray, _run(*arguments(first)))
 
-    _run.begin(*arguments(0))  # once: threads would do it each
+    _run.ready(*arguments(0))  # once: threads would have it compiled, and wait, each
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         tallies = list(pool.map(group, range(0, filled, LANES)))
     tally = jax.tree.map(lambda *x: np.concatenate(x)[: rows * lanes_per_row].reshape(rows, -1).sum(1, dtype=float), *tallies)
