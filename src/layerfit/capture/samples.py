@@ -68,6 +68,16 @@ class Samples:
         """wi, wo, weight and place: what a material is evaluated at."""
         return self.wi, self.wo, self.weight, self.place
 
+    def some(self, which: np.ndarray) -> "Samples":
+        """Those of some of the pixels, by their places among these."""
+        place = self.place
+        if place is not None:
+            given = {f.name: getattr(place, f.name) for f in dataclasses.fields(place)}
+            place = Place(**{name: value if value is None else value[which] for name, value in given.items()})
+        arrays = {name: getattr(self, name)[which] for name in ("wi", "wo", "weight", "target", "index")}
+        noise = None if self.noise is None else self.noise[which]
+        return dataclasses.replace(self, **arrays, noise=noise, place=place)
+
 
 @dataclasses.dataclass(frozen=True)
 class View:

@@ -20,10 +20,11 @@ from ..stack import Stack
 from . import discrepancy
 from .blocks import Block, arrange, channels_first
 from .difference import Curve, compared, curve, slope
-from .parameters import Parametrisation, parametrise, with_fixed
+from .parameters import parametrise, with_fixed
 from .residuals import NEAR, begin, depths, initial, rows, scaled, step
-from .result import FitResult, Held, Minimum, Row
+from .result import FitResult, Held, Row
 from .solve import NormalLevenbergMarquardt
+from .starts import FINE_STEPS, LEVEL, SCREENED, Minimum, distinct, in_sight, ranked, search, space_filling
 from .uncertainty import GROUPS, estimate
 from .weights import brightness, inverse_sigma, misfit, robust
 
@@ -39,8 +40,6 @@ DIRECTIONS = QUADRATURE // 2
 COARSE_BLOCKS = 2
 """Blocks of pixels for the search, and at least one of each reference: enough to tell minima apart."""
 
-COARSE_STEPS = 12
-FINE_STEPS = 60
 ROUNDS = 3
 """Reweightings: the weights follow the model's values, which follow the weights."""
 
@@ -63,8 +62,8 @@ def fit(
 
     `free` are names such as "coat.alpha" (left out: what an image can tell), `fixed` are values by name. `metric` is "law", "uniform",
     "relative", "log" or "cube_root" (see `difference`), `loss` "square", "huber" or "cauchy". `starts` space-filling starts are tried beside
-    the given one, all coarsely on few pixels, the best of them to the end. With `model_error` sigmas hold what the form of the model gets
-    wrong, too: a random walk tells it, at the fitted material (see `discrepancy`). Raises `InputError` for what cannot be fitted.
+    the given one, all coarsely on few pixels, the best places that they reach to the end. With `model_error` sigmas hold what the form of the
+    model gets wrong, too: a random walk tells it, at the fitted material (see `discrepancy`). Raises `InputError` for what cannot be fitted.
     """
     if metric not in METRICS:
         raise InputError(f"{where}.metric = {metric!r}: should be one of {', '.join(METRICS)}{nearest(metric, METRICS)}")
@@ -91,6 +90,8 @@ class _Fit:
         blocks, self.layout = arrange(self.samples, _scales(views, start), seed, start.needs)
         self.curves = [curve(metric, brightness(s.target)) for s in self.samples]
         self.blocks = [_compared_by(self.curves[of[0]], block) for of, block in zip(self.layout.reference, blocks, strict=True)]
+        first = self.layout.pixel[: len(views)]  # a block of each reference, in their order
+        self.few = [s.some(block[block >= 0]) for s, block in zip(self.samples, first, strict=True)]
         self.solver = NormalLevenbergMarquardt()
         self._set_bounds()
 
@@ -106,19 +107,18 @@ class _Fit:
         if self.model_error:
             discrepancy.begin(self.start)
         self._weigh(None)
-        self._drop_blind(origin)
+        minima = self._settled(self._search())
         origin = self.free.pack(self.start)
-        minima = self._search(origin)
-        best = minima[0]
-        u = best.vector
+        best, converged = minima[0], False
         for k in range(ROUNDS):
-            self._weigh(u)
-            u, cost, converged, gram = self._descend(u, self.blocks, FINE_STEPS, f"fine {k + 1}", best.start)
+            self._weigh(best.vector)
+            best, converged = self._descend(best, self.blocks, FINE_STEPS, f"fine {k + 1}")
             self.progress("fine", (k + 1) / ROUNDS)
+        u, cost, gram = best.vector, best.cost, best.gram
         held = (u <= self.bounds[0]) | (u >= self.bounds[1])
         jacobian, residual = rows(u, self.start, self.blocks, free=self.free)
         uncertainty = estimate(gram, held, jacobian, residual, self._sectors())
-        models = self._models(u)
+        models = self._models(u, self.samples)
         off = self._discrepancy(u, models, jacobian, gram, held) if self.model_error else None
         clock = CLOCK.since(self.clock)
         return FitResult(
@@ -147,15 +147,18 @@ class _Fit:
 
     def _weigh(self, u: np.ndarray | None) -> None:
         """Set the residual weights from the model at `u`, or equal ones before there is a model."""
-        first = "uniform" if self.curves[0] is None else self.metric
-        even = [inverse_sigma(s.target, s.target, None, first) for s in self.samples]
-        values = even if u is None else self._weights(self._models(u), self.metric)
+        values = self._even(self.samples) if u is None else self._weights(self._models(u, self.samples), self.metric)
         weight = channels_first(self.layout.scatter(values, 0.0))
         self.brightness = [
             float(np.sum((w * compared(block.target, block.curve)).astype(float) ** 2))
             for w, block in zip(weight, self.blocks, strict=True)
         ]
         self.blocks = [_weighted(block, w) for block, w in zip(self.blocks, weight, strict=True)]
+
+    def _even(self, samples: Sequence[Samples]) -> list[np.ndarray]:
+        """Weights before there is a model."""
+        first = "uniform" if self.curves[0] is None else self.metric
+        return [inverse_sigma(s.target, s.target, None, first) for s in samples]
 
     def _weights(self, models: Sequence[np.ndarray], metric: str) -> list[np.ndarray]:
         """Weights of the residuals of these models, a reference each."""
@@ -167,11 +170,11 @@ class _Fit:
             values.append(weight * robust(difference * weight, self.loss))
         return values
 
-    def _models(self, u: np.ndarray) -> list[np.ndarray]:
+    def _models(self, u: np.ndarray, samples: Sequence[Samples]) -> list[np.ndarray]:
         stack = self._material(u)
         return [
             render.predict(scaled(stack, view.scales(stack)), s.wi, s.wo, s.weight, narrowed(s.place, stack.needs))
-            for view, s in zip(self.views, self.samples, strict=True)
+            for view, s in zip(self.views, samples, strict=True)
         ]
 
     def _material(self, u: np.ndarray) -> Stack:
@@ -182,61 +185,93 @@ class _Fit:
         return step(u, state, self.bounds, self.start, blocks, free=self.free, solver=self.solver)
 
     def _descend(
-        self, u: Any, blocks: Sequence[Block], most: int, stage: str, start: int, trust: float = NEAR
-    ) -> tuple[np.ndarray, float, bool, np.ndarray]:
-        """Run the solver from `u` on some blocks; returns the point, its cost, whether it converged, and J^T J."""
-        u = np.asarray(u, float)
+        self, at: Minimum, blocks: Sequence[Block], most: int, stage: str, trust: float = NEAR
+    ) -> tuple[Minimum, bool]:
+        """Run the solver from a point on some blocks; returns where it came to, and whether it converged."""
+        u = np.asarray(at.vector, float)
         state = initial(u, self.solver, trust)
-        scale = max(sum(self.brightness[: len(blocks)]), 1e-30)
+        scale = max(self._brightness(blocks), 1e-30)
         for k in range(most):
             u, state = self._step(u, state, blocks)
             error = float(np.sqrt(2.0 * float(state.loss) / scale))
-            self.trace.append(Row(time.perf_counter() - self.began, stage, start, k, error))
+            self.trace.append(Row(time.perf_counter() - self.began, stage, at.starts[0], k, error))
             if bool(state.done):
                 break
-        return (
-            np.asarray(u),
-            float(state.loss),
-            bool(state.done) and bool(np.isfinite(float(state.loss))),
-            np.asarray(state.gram),
-        )
+        finite = bool(np.isfinite(float(state.loss)))
+        cost = float(state.loss) if finite else np.inf
+        reached = dataclasses.replace(at, vector=np.asarray(u), cost=cost, gram=np.asarray(state.gram))
+        return reached, bool(state.done) and finite
 
-    def _drop_blind(self, origin: np.ndarray) -> None:
-        """Hold what has no effect on these images, with a reason; a parameter that the user asked for by name is an error."""
-        at = np.asarray(origin)
-        _, state = self._step(at, initial(at, self.solver), self.blocks)
-        if not np.isfinite(float(state.loss)):
+    def _brightness(self, blocks: Sequence[Block]) -> float:
+        return sum(self.brightness[: len(blocks)])
+
+    def _points(self, blocks: Sequence[Block]) -> list[np.ndarray]:
+        """Starts: the given one, and the best of many space-filling ones. What has no effect at any of them is held."""
+        drawn = space_filling(self.free, SCREENED * (self.starts - 1), self.seed)
+        order = np.argsort([self._glance(point) for point in drawn], kind="stable")
+        points = [self.free.pack(self.start), *(drawn[k] for k in order[: self.starts - 1])]
+        effects = [self._effect(point, blocks) for point in points]
+        seen = [effect > 1e-7 * effect.max() for effect in effects if effect is not None]
+        if not seen:
             raise InputError(f"{self.where}: the start gives no finite image; choose other values in [material]")
-        effect = np.sqrt(np.diag(np.asarray(state.gram)))
-        blind = [f for f in self.free.free if np.all(effect[list(f.slots)] <= 1e-7 * effect.max())]
+        if effects[0] is None:
+            self.notes.append("the start gives no finite image; the fit began from others")
+        told = np.any(seen, 0)
+        kept = [f for f in self.free.free if np.any(told[list(f.slots)])]
+        slots = [slot for f in kept for slot in f.slots]
+        self._hold([f.name for f in self.free.free if f not in kept])
+        return [point[slots] for point in points]
+
+    def _glance(self, u: np.ndarray) -> float:
+        """Cost of the first block of each reference at a point, without derivatives."""
+        models, weights = self._models(u, self.few), self._even(self.few)
+        residual = [
+            w * (compared(model, by) - compared(seen.target, by))
+            for model, seen, by, w in zip(models, self.few, self.curves, weights, strict=True)
+        ]
+        cost = sum(np.sum(np.square(r, dtype=float)) for r in residual)
+        return float(cost) if np.isfinite(cost) else np.inf
+
+    def _effect(self, u: np.ndarray, blocks: Sequence[Block]) -> np.ndarray | None:
+        """How much the images change with each parameter; None where they are not finite."""
+        _, state = self._step(u, initial(u, self.solver), blocks)
+        return np.sqrt(np.diag(np.asarray(state.gram))) if np.isfinite(float(state.loss)) else None
+
+    def _hold(self, blind: Sequence[str]) -> None:
+        """Hold what has no effect on these images, with a reason; a parameter that the user asked for by name is an error."""
         if not blind:
             return
-        names = [f.name for f in blind]
         if self.explicit:
             raise InputError(
-                f"{self.where}.free: {_have_no_effect(names)} at the start; leave {'it' if len(names) == 1 else 'them'} out, or start where "
-                "there is one (a base below an opaque coat has none)"
+                f"{self.where}.free: {_have_no_effect(blind)} at {'the start' if self.starts == 1 else 'any start'}; leave "
+                f"{'it' if len(blind) == 1 else 'them'} out, or start where there is one (a base below an opaque coat has none)"
             )
-        self.notes.append(f"{_have_no_effect(names)} and {'was' if len(names) == 1 else 'were'} held at the start")
-        left = [f.name for f in self.free.free if f.name not in names]
+        self.notes.append(f"{_have_no_effect(blind)} and {'was' if len(blind) == 1 else 'were'} held at the start")
+        left = [f.name for f in self.free.free if f.name not in blind]
         self.start, self.free = parametrise(self.start, left, (), self.where)
         self._set_bounds()
 
-    def _search(self, origin: np.ndarray) -> list[Minimum]:
-        """Minima of the coarse fit, best first: from the given start and from space-filling ones."""
-        found = []
+    def _search(self) -> list[Minimum]:
+        """Minima of the coarse fit, best first."""
         sample = self.blocks[: max(COARSE_BLOCKS, len(self.views))]
-        points = [origin, *_space_filling(self.free, origin, self.starts - 1, self.seed)]
-        for k, point in enumerate(points):
-            u, cost, _, _ = self._descend(point, sample, COARSE_STEPS, "coarse", k, 1.0)
-            found.append(Minimum(k, u, cost if np.isfinite(cost) else np.inf))
-            self.progress("coarse", (k + 1) / len(points))
-        found.sort(key=lambda m: m.cost)
-        polished = []
-        for minimum in found[:3]:
-            u, cost, _, _ = self._descend(minimum.vector, sample, FINE_STEPS, "polish", minimum.start)
-            polished.append(Minimum(minimum.start, u, cost))
-        return sorted(polished, key=lambda m: m.cost) + found[3:]
+
+        def descend(at: Minimum, most: int, stage: str) -> Minimum:
+            return self._descend(at, sample, most, stage, 1.0 if stage == "coarse" else NEAR)[0]
+
+        level = LEVEL * self._brightness(sample)
+        return search(
+            self._points(self.blocks[: len(self.views)]), descend, level, lambda share: self.progress("coarse", share)
+        )
+
+    def _settled(self, minima: list[Minimum]) -> list[Minimum]:
+        """The same where it takes all pixels, and weights that follow the model, to say which is best."""
+        near = in_sight(minima)
+        if len(near) == 1:
+            return minima
+        self._weigh(near[0].vector)
+        level = LEVEL * self._brightness(self.blocks)
+        ends = distinct([self._descend(m, self.blocks, FINE_STEPS, "compare")[0] for m in near], level)
+        return [*ranked(ends, level), *(m for m in minima if not any(m is other for other in near))]
 
     def _discrepancy(
         self, u: np.ndarray, models: Sequence[np.ndarray], jacobian: np.ndarray, gram: np.ndarray, held: np.ndarray
@@ -315,28 +350,3 @@ def _scales(views: Sequence[AnyView], start: Stack) -> np.ndarray | None:
     if all(scale is None for scale in scales):
         return None
     return np.array([np.ones(len(start.layers) + 1) if scale is None else scale for scale in scales])
-
-
-def _space_filling(free: Parametrisation, origin: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
-    """Starts spread evenly over the middle of the bounds (R sequence, Roberts 2018); channels of a colour move together."""
-    d = len(free.free)
-    g = 2.0
-    for _ in range(64):
-        g = (1.0 + g) ** (1.0 / (d + 1))
-    lower, upper = free.bounds()
-    points = []
-    for k in range(count):
-        x = (0.5 + (k + 1 + seed) * g ** -np.arange(1, d + 1)) % 1.0
-        u = origin.copy()
-        for place, f in zip(x, free.free, strict=True):
-            for slot in f.slots:
-                low, high = _plausible(f.spec.scale, lower[slot], upper[slot])
-                u[slot] = low + place * (high - low)
-        points.append(u)
-    return points
-
-
-def _plausible(scale: str, lower: float, upper: float) -> tuple[float, float]:
-    """The middle of a range, where materials are: the rest is reached from there."""
-    width = upper - lower
-    return (lower + 0.4 * width, upper - 0.05 * width) if scale == "log" else (lower + 0.1 * width, lower + 0.6 * width)

@@ -15,6 +15,7 @@ from ..stack import Stack
 from . import words
 from .discrepancy import Discrepancy
 from .parameters import Parametrisation
+from .starts import SIGHT, Minimum
 from .uncertainty import WEAK_SIGMA, Uncertainty, in_words
 
 SCHEMA = "layerfit/fit"
@@ -39,15 +40,6 @@ class Row:
     step: int
     error: float
     """Weighted residual over the weighted image, root of sums of squares, of the pixels in use."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Minimum:
-    """Where one start led."""
-
-    start: int
-    vector: np.ndarray
-    cost: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -202,6 +194,20 @@ def unidentified(result: FitResult) -> list[dict[str, Any]]:
     return rows
 
 
+def minima(result: FitResult) -> list[dict[str, Any]]:
+    """Where the starts led, best first: which of them, the cost over that of the best with the same weights, and the values there."""
+    values = [result.vector, *(m.vector for m in result.minima[1:])]
+    return [
+        {
+            "starts": sorted(m.starts),
+            "cost_over_best": float(f"{m.over:.4g}"),
+            "followed": m.ended,
+            "values": {name: rounded(value) for name, value in result.free.values(u).items()},
+        }
+        for m, u in zip(result.minima, values, strict=True)
+    ]
+
+
 def flags(result: FitResult, rows: dict[str, dict[str, Any]], pairs: list[list[Any]]) -> list[str]:
     """What a reader should know before using the values; empty for a fit without blemish."""
     found = [] if result.converged else ["not_converged"]
@@ -211,6 +217,8 @@ def flags(result: FitResult, rows: dict[str, dict[str, Any]], pairs: list[list[A
     found += [f"correlated:{a}~{b}" for a, b, r in pairs if abs(r) > 0.95]
     if unidentified(result):
         found.append("undetermined_direction")
+    if any(m.over <= SIGHT for m in result.minima[1:] if m.ended):
+        found.append("other_minimum")
     return found
 
 
@@ -239,8 +247,8 @@ def to_json(
         "model_error": {},
         "time": {key: round(value, 3) for key, value in seconds.items()},
         "steps": result.steps,
-        "starts": len(result.minima),
-        "minima": [{"start": m.start, "cost": float(f"{m.cost:.6g}")} for m in result.minima],
+        "starts": sum(len(m.starts) for m in result.minima),
+        "minima": minima(result),
         "pixels": {
             "used": sum(len(s.index) for s in result.samples),
             "dropped": [view.dropped for view in result.views],

@@ -2,7 +2,7 @@
 
 import html
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..stack import Stack
@@ -86,6 +86,25 @@ def measured(value: Any, sigma: Any) -> tuple[str, str]:
     wanted = 1 - math.floor(math.log10(sigma))
     decimals = max(min(wanted, 6 - math.floor(math.log10(abs(value)))), 0)
     return f"{value:.{decimals}f}", f"{sigma:.{decimals}f}" if decimals == wanted else f"{sigma:.2g}"
+
+
+def starts(count: int, minima: Sequence[Mapping[str, Any]]) -> str:
+    """How many starts came to the best minimum, and how many were given up on their way."""
+    left = sum(len(row["starts"]) for row in minima if not row["followed"])
+    return f"{count}, of which {len(minima[0]['starts'])} reached this minimum" + (
+        f" and {left} were given up on their way" if left else ""
+    )
+
+
+def other_minima(minima: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A line each: how much worse, how many starts came there, and the values there. Places that were not followed to their end are left out."""
+    return [_minimum(row) for row in minima[1:] if row["followed"]]
+
+
+def _minimum(row: Mapping[str, Any]) -> str:
+    values = ", ".join(f"{name} {number(value)}" for name, value in row["values"].items())
+    starts = len(row["starts"])
+    return f"{math.sqrt(row['cost_over_best']):.3g} ({starts} start{'s' if starts > 1 else ''}): {values}"
 
 
 def model_error(error: Mapping[str, Any]) -> str:

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from ..fit import words
 
 
@@ -24,7 +22,7 @@ def lines(document: Mapping[str, Any]) -> list[str]:
             "pixels": f"{_pixels(pixels)}{_dropped(pixels['dropped'])}",
             "metric": _weights(d["weighting"]),
             "light": _light(d["quadrature"]),
-            "starts": f"{d['starts']}, of which {_same_minimum(d['minima'])} reached this minimum",
+            "starts": words.starts(d["starts"], d["minima"]),
         }
     )
     if "poor_fit" in d["flags"]:
@@ -38,6 +36,9 @@ def lines(document: Mapping[str, Any]) -> list[str]:
         out += ["[[Identifiability]]"]
         out += [f"    {row['why']}" for row in d["unidentified"]]
         out += [f"    {note}" for note in d["notes"]]
+    others = words.other_minima(d["minima"])
+    if others:
+        out += ["[[Other minima]] (error over that of this one)", *(f"    {line}" for line in others)]
     if d["left_out"]:
         out += ["[[Left out]]", f"    {', '.join(d['left_out'])}"]
     parity = d["parity"]
@@ -138,8 +139,3 @@ def _dropped(dropped: Sequence[Mapping[str, int]]) -> str:
         for reason, count in view.items():
             total[reason] = total.get(reason, 0) + count
     return "; left out: " + ", ".join(f"{count} {reason}" for reason, count in total.items()) if total else ""
-
-
-def _same_minimum(minima: Sequence[Mapping[str, float]]) -> int:
-    costs = np.array([m["cost"] for m in minima])
-    return int(np.sum(costs <= costs.min() * 1.02 + 1e-9))
