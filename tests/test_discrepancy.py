@@ -2,17 +2,20 @@
 
 import dataclasses
 import json
+from unittest import mock
 
 import numpy as np
 import pytest
 
 from helpers import COPPER, sphere_view
 from layerfit.capture.samples import View
-from layerfit.fit.discrepancy import unmeasured
+from layerfit.fit import discrepancy
+from layerfit.fit.discrepancy import PLACES, unmeasured
 from layerfit.fit.fit import fit
 from layerfit.fit.result import parameters, to_json
 from layerfit.forms.corrected import Corrected
 from layerfit.layers import Coat, Patina
+from layerfit.render import predict
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor
 from layerfit.walk import top_lobe, walk_rows
@@ -40,7 +43,8 @@ def walked(view: View, stack: Stack, paths: int) -> np.ndarray:
 def result(tmp_path_factory):
     view = sphere_view(MATERIAL, tmp_path_factory.mktemp("walk"), 32)
     view = dataclasses.replace(view, target=walked(view, MATERIAL, 8000))
-    return fit([view], START, free=tuple(TRUTH), starts=2, model_error=True)
+    with mock.patch.object(discrepancy, "PLACES", (0.0,)):  # it was drawn at the centres of the pixels
+        return fit([view], START, free=tuple(TRUTH), starts=2, model_error=True)
 
 
 def test_a_value_without_the_error_of_its_form_is_nearer_to_the_truth(result):
@@ -70,6 +74,24 @@ def test_it_is_said_what_a_sigma_is_of(result):
     json.dumps(document, allow_nan=False)
     assert "corrected" in repr(result)
     assert "corrected" in result._repr_html_()
+
+
+def test_a_pixel_sees_all_of_its_surface(tmp_path):
+    """A narrow highlight at 24 x 24 pixels is the mean of 4 x 4 smaller ones, each seen at its centre."""
+    stack = Stack((Coat(alpha=0.1, eta=1.5),), Conductor(alpha=0.2, **COPPER), Corrected())
+    folders = [tmp_path / name for name in ("fine", "coarse")]
+    for folder in folders:
+        folder.mkdir()
+    fine, coarse = (sphere_view(stack, folder, side) for folder, side in zip(folders, (96, 24), strict=True))
+    each = fine.image(fine.target).reshape(24, 4, 24, 4, 3).mean((1, 3)).reshape(-1, 3)
+    whole = fine.covered.reshape(24, 4, 24, 4).all((1, 3)).ravel()[coarse.index]
+    which = np.flatnonzero(whole)
+    wanted = each[coarse.index[which]]
+    inside = [predict(stack, *coarse.moved(which, dx, dy).samples().arrays[:3]) for dx in PLACES for dy in PLACES]
+    bright = wanted > 0.2 * wanted.max()
+    at_centre, over_pixel = (np.abs(f / wanted - 1.0)[bright] for f in (coarse.target[which], np.mean(inside, 0)))
+    assert np.max(at_centre) > 0.05
+    assert np.max(over_pixel) < 0.1 * np.max(at_centre)
 
 
 def test_a_bare_surface_has_no_error(tmp_path):

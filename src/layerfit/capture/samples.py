@@ -133,6 +133,30 @@ class View:
         """Thickness of each layer in this image over that of the material, the base last, or None where all are 1."""
         return layer_scales(self.reference.thickness_scale, stack)
 
+    def moved(self, which: np.ndarray, dx: float, dy: float) -> "View":
+        """Some pixels, seen at a place beside their centres: `dx`, `dy` in pixels, along the surface that their neighbours show."""
+        y, x = np.divmod(self.index[which], self.shape[1])
+        covered = np.pad(self.covered, 1)
+
+        def at(values: np.ndarray) -> np.ndarray:
+            image = np.pad(self.image(values), ((1, 1), (1, 1), (0, 0)))
+            here = image[y + 1, x + 1]
+            moved = here
+            for step, (sy, sx) in ((dx, (0, 1)), (dy, (1, 0))):
+                after, before = (y + 1 + sy, x + 1 + sx), (y + 1 - sy, x + 1 - sx)
+                there = [np.where(covered[place][:, None], image[place], here) for place in (after, before)]
+                steps = covered[after].astype(float) + covered[before]
+                moved = moved + step * (there[0] - there[1]) / np.maximum(steps, 1.0)[:, None]
+            return moved
+
+        position = at(self.position)
+        view = normalise(np.asarray(self.reference.camera.position) - position)
+        kept = {
+            name: None if (value := getattr(self, name)) is None else value[which]
+            for name in ("target", "noise", "tangent", "uv", "index")
+        }
+        return dataclasses.replace(self, normal=normalise(at(self.normal)), position=position, view=view, **kept)
+
     def samples(self, which: np.ndarray | None = None, quadrature: int = QUADRATURE, seed: int = 0) -> Samples:
         """Samples of all usable pixels, or of some."""
         which = np.arange(len(self.index)) if which is None else which

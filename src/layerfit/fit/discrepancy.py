@@ -16,7 +16,7 @@ import numpy as np
 from .. import walk
 from .._compiled import Compiled
 from ..capture.load import AnyView
-from ..capture.samples import Samples
+from ..capture.samples import Samples, View
 from ..forms.precise import Precise
 from ..render import predict
 from ..stack import IN_TIME, Stack
@@ -28,6 +28,9 @@ PAIRS = 512
 
 PATHS = 2000
 """Of the walk, for each of them: its noise then stays below that of the draw."""
+
+PLACES = (-0.375, -0.125, 0.125, 0.375)
+"""Parts of a pixel, along each of its sides: light comes from all of it, and the fit looks at its centre."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,7 +94,7 @@ def measure(
     for k, (view, seen) in enumerate(zip(views, samples, strict=True)):
         here = place[0][drawn] == k
         if here.any():
-            off[here] = _off(scaled(stack, view.scales(stack)), seen, place[1][drawn[here]], rng)
+            off[here] = _off(scaled(stack, view.scales(stack)), view, seen, place[1][drawn[here]], rng)
     pull = np.einsum("pci,pc->pi", jacobian[drawn], off * inverse_sigma[drawn]) / chance[drawn, None]
     steps = newton(gram, held, pull)
     return Discrepancy(steps.mean(0), steps.std(0, ddof=1) / np.sqrt(PAIRS))
@@ -105,18 +108,26 @@ def _chance(jacobian: np.ndarray, gram: np.ndarray, held: np.ndarray, counts: np
     return 0.5 * counts / counts.sum() + 0.5 * leverage / leverage.sum()
 
 
-def _off(stack: Stack, samples: Samples, pixels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Radiance of the form less that of the walk, (pixels, 3): of one light sample each, in place of the sum over all."""
+def _off(stack: Stack, view: AnyView, samples: Samples, pixels: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Radiance that the fit has less that of the reference, (pixels, 3): of one light sample each, in place of the sum over all."""
     bright = samples.weight[pixels].sum(-1)
     chance = bright / bright.sum(-1, keepdims=True)
     light = np.argmax(np.cumsum(chance, -1) > rng.random((len(pixels), 1)), -1)
     each = np.arange(len(pixels))
-    wi, wo = samples.wi[pixels, light], samples.wo[pixels]
-    form = predict(stack, wi[:, None], wo, np.ones((len(pixels), 1, 3), np.float32))
+    wi, wo, weight = samples.wi[pixels, light], samples.wo[pixels], samples.weight[pixels, light]
+    form = _brdf(stack, wi, wo)
     rows = jax.tree.map(lambda x: np.asarray(x, np.float32)[None], (stack, walk.hazes(stack)))
     walked = walk.walk_rows(rows[0], wi, wo, paths=PATHS, seed=0, interface=interface(stack), haze=rows[1])
-    weight = samples.weight[pixels, light] / chance[each, light, None]
-    return (form - _top(stack, wi, wo) - walked.mean) * weight
+    off = (form - _top(stack, wi, wo) - walked.mean) * weight
+    if isinstance(view, View) and view.exact:
+        which = np.searchsorted(view.index, samples.index[pixels])
+        inside = [view.moved(which, dx, dy).samples() for dx in PLACES for dy in PLACES]
+        off += form * weight - np.mean([_brdf(stack, s.wi[each, light], s.wo) * s.weight[each, light] for s in inside], 0)
+    return off / chance[each, light, None]
+
+
+def _brdf(stack: Stack, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    return predict(stack, wi[:, None], wo, np.ones((len(wi), 1, 3), np.float32))
 
 
 def _lobe(coat: Any, wi: Any, wo: Any) -> Any:
