@@ -280,9 +280,8 @@ def test_a_shader_that_is_not_the_material_is_a_finding(scene, gl, tmp_path, mon
 
 
 def test_a_fit_that_does_not_converge_is_a_finding(scene, gl, tmp_path, monkeypatch):
-    solver = importlib.import_module("layerfit.fit.fit")
-    monkeypatch.setattr(solver, "FINE_STEPS", 1)
-    monkeypatch.setattr(solver, "COARSE_STEPS", 1)
+    for module, steps in (("fit", "FINE_STEPS"), ("starts", "FINE_STEPS"), ("starts", "COARSE_STEPS")):
+        monkeypatch.setattr(importlib.import_module(f"layerfit.fit.{module}"), steps, 1)
     ran = layerfit("fit", scene, "-o", tmp_path, "--starts", "1", "--json")
     assert ran.code == 1, ran.err
     document = json.loads(ran.out)
