@@ -127,8 +127,8 @@ SCENES = {
         [r"scene\.toml: fit\.free", r"did you mean 'coat\.tau'", r"This material has"],
     ),
     "no effect": (
-        in_scene("tau = [0.3, 0.3, 0.3]", "tau = [19, 19, 19]"),
-        [r"coat\.tau, base\.alpha have no effect on this image", r"leave them out"],
+        lambda f: (in_scene('"coat.tau", ', "")(f), in_scene("tau = [0.3, 0.3, 0.3]", "tau = [19, 19, 19]")(f)),
+        [r"base\.alpha has no effect on this image at any start", r"leave it out"],
     ),
     "nothing to fit": (
         in_scene('free = ["coat.alpha", "coat.eta", "coat.tau", "base.alpha"]', "free = []"),
