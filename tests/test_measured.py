@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from commands import layerfit
 from helpers import COPPER, STACKS, hemisphere
 from layerfit.capture.inspect import inspect
 from layerfit.capture.load import load
@@ -145,6 +146,19 @@ def test_zeros_are_dropped_and_counted_and_negative_channels_clipped(tmp_path):
     assert "colour outside of Rec.709" in {finding.what for finding in inspect(tmp_path / "a.csv").findings}
 
 
+@pytest.mark.parametrize("name", FORMATS)
+def test_inspect_says_what_is_in_a_file(name, tmp_path):
+    made(tmp_path / name)
+    ran = layerfit("inspect", str(tmp_path / name))
+    assert ran.code == 0
+    assert "half angle" in ran.out
+    told = json.loads(layerfit("inspect", str(tmp_path / name), "--json").out)
+    found = read_brdf(tmp_path / name)
+    assert told["samples"] == len(found.f)
+    assert told["kind"] == found.kind
+    assert told["ranges"]["red [1/sr]"][1] == pytest.approx(found.f[:, 0].max(), rel=1e-4)
+
+
 def test_cells_that_were_not_measured_are_no_samples(tmp_path):
     write_merl(tmp_path / "a.binary", paint, (8, 6, 10))
     found = read_brdf(tmp_path / "a.binary")
@@ -277,7 +291,7 @@ def test_a_fit_of_a_measurement_leaves_what_a_fit_leaves(tmp_path, gl):
     assert document["error"]["rel_l2"] < 1e-3
     assert document["parity"]["passed"]
     assert document["pixels"]["dropped"][0]["marked as invalid"] > 0
-    assert {"fit.png", "preset.json", "material.frag", "report.html", "trace.csv"} <= {
+    assert {"fit.png", "planes.png", "preset.json", "material.frag", "report.html", "trace.csv"} <= {
         p.name for p in (tmp_path / "out").iterdir()
     }
 

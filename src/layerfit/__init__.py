@@ -10,6 +10,7 @@
 - References: read_scene gives a Scene, load its View of each reference, from which Samples are drawn; inspect says what a file holds.
   read_brdf gives a MeasuredBrdf.
 - Fitting: fit gives a FitResult, parameters its values with sigmas; fit_scene does what `layerfit fit` does; image_error compares pictures.
+- Structures: choose_structure tries candidates and gives a StructureChoice; structures_of does what `layerfit structures` does.
 - Rendering: predict gives pixels, radiance the same traced, brdf the plain function; Place is where on the surface.
 - Shaders: print_material gives a Shader; shade_samples draws it; check_pairs and check_image compare it with JAX and give a Parity.
 - The machine: use_compilation_cache. Faults: InputError and MachineError, each a LayerfitError.

@@ -12,6 +12,7 @@ from .errors import InputError as InputError, LayerfitError as LayerfitError, Ma
 from .fit.fit import fit as fit
 from .fit.metrics import image_error as image_error
 from .fit.result import FitResult as FitResult, parameters as parameters
+from .fit.structures import StructureChoice as StructureChoice, choose_structure as choose_structure
 from .forms.corrected import Corrected as Corrected
 from .forms.faithful import Faithful as Faithful
 from .forms.precise import Precise as Precise
@@ -38,6 +39,7 @@ from .shader.verify import (
 )
 from .shipped import Shipped as Shipped, shipped_presets as shipped_presets
 from .stack import Stack as Stack
+from .structures import structures_of as structures_of
 from .surfaces import (
     Blinn as Blinn,
     CarPaint as CarPaint,

@@ -151,6 +151,49 @@ class _progress:
 
 
 @app.command()
+def structures(
+    reference: Annotated[Path, typer.Argument(help="Scene file, or a measured BRDF: .brdf, .bsdf, .binary or .csv.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    only: Annotated[str | None, typer.Option(help="Names of structures to try, with commas; left out, all.")] = None,
+    metric: Annotated[str, typer.Option(help="law, uniform, relative, log or cube_root.")] = "log",
+    min_half_deg: Annotated[
+        float, typer.Option(min=0.0, max=89.0, help="Of a measured BRDF: leave out what is nearer to the mirror direction.")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of starts and pixel choices.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Find out which structure a reference supports: fit candidates, and choose the simplest that explains it.
+
+    Leaves `structures.json` and `structures.png` in the output directory, beside what a fit of the chosen one leaves. Exit code 1: it
+    does not explain the reference, or its fit has findings.
+
+    Example: `layerfit structures paint.bsdf -o out/paint`
+    """
+    from .cache import use_compilation_cache
+
+    use_compilation_cache()
+    from .capture.scene import METRICS
+    from .report.structures import table
+    from .structures import structures_of
+
+    _check_choice(metric, METRICS, "--metric")
+    names = None if only is None else [name.strip() for name in only.split(",")]
+    with _progress() as report:
+        outcome = structures_of(
+            reference, output, structures=names, metric=metric, seed=seed, min_half_deg=min_half_deg, progress=report
+        )
+    stderr.print(table(outcome.document))
+    for sentence in outcome.document["in_words"]:
+        _say(sentence)
+    _say(
+        f"Wrote structures.png and structures.json in {output}/, and of the fit fit.png, report.html, preset.json and fit.json"
+    )
+    if as_json:
+        _emit(outcome.document)
+    raise typer.Exit(0 if outcome.good else 1)
+
+
+@app.command()
 def render(
     preset: Preset,
     scene: Scene,

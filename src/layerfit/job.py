@@ -16,7 +16,7 @@ from .capture.load import AnyView, load
 from .capture.measured.sphere import sphere_of
 from .capture.measured.view import MeasuredView
 from .capture.samples import QUADRATURE, Samples, View
-from .capture.scene import read_scene
+from .capture.scene import Scene, read_scene
 from .documents import check_directory, finite, write_bytes, write_text
 from .errors import InputError
 from .fit.fit import fit
@@ -29,7 +29,7 @@ from .forms.accuracy import against_walk
 from .forms.precise import Precise, refuses
 from .preset import model_name, preset_of
 from .render import predict
-from .report import html, pictures
+from .report import html, pictures, planes
 from .shader.export import Shader, print_material
 from .shader.gl import renderer
 from .shader.verify import FLOOR, MAX_REL, P999_REL, Parity, check_image, check_pairs, compare, shade_samples, together
@@ -56,20 +56,20 @@ class Outcome:
 
 
 def fit_scene(
-    path: str | Path,
+    scene: str | Path | Scene,
     directory: str | Path,
     *,
     import_s: float = 0.0,
     progress: Progress = lambda stage, share: None,
     **options: Any,
 ) -> Outcome:
-    """Fit a scene and write everything to `directory`; each file whole or not at all, `fit.json` last.
+    """Fit a scene, or its file, and write everything to `directory`; each file whole or not at all, `fit.json` last.
 
     `options` override the scene's [fit] table. Raises `LayerfitError` for input or a machine that is at fault.
     """
     began = time.perf_counter()
-    path, directory = Path(path), Path(directory)
-    scene = read_scene(path)
+    scene = scene if isinstance(scene, Scene) else read_scene(scene)
+    path, directory = scene.path, Path(directory)
     request = dataclasses.replace(scene.fit, **{k: v for k, v in options.items() if v is not None})
     views = load(scene)
     check_directory(directory)
@@ -129,10 +129,28 @@ def fit_scene(
     write_text(directory / "material.frag", shader.text())
     write_text(directory / "trace.csv", _trace(result))
     write_bytes(directory / "fit.png", picture)
+    in_planes = _planes(result, name)
+    if in_planes is not None:
+        write_bytes(directory / "planes.png", in_planes)
     write_text(directory / "preset.json", json.dumps(preset_of(result.stack, name, fit=_summary(document)), indent=2) + "\n")
-    write_text(directory / "report.html", html.page(name, document, picture, convergence, shader.text()))
+    write_text(directory / "report.html", html.page(name, document, picture, convergence, shader.text(), in_planes))
     write_text(directory / "fit.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
     return Outcome(document, directory, result.converged and parity.passed)
+
+
+def _planes(result: FitResult, name: str) -> bytes | None:
+    """A measured BRDF and its fit in planes of incidence; None where there is none, or no samples lie in one."""
+    for view in result.views:
+        if isinstance(view, MeasuredView):
+            stack = scaled(result.stack, view.scales(result.stack))
+            if found := planes.planes(view.brdf, lambda wi, wo, stack=stack: _values(stack, wi, wo)):
+                return planes.drawn(found, name)
+    return None
+
+
+def _values(stack: Stack, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """BRDF (n, 3) of pairs of directions (n, 3)."""
+    return predict(stack, wi[:, None], wo, np.ones((len(wi), 1, 3)))
 
 
 def _model(stack: Stack) -> dict[str, Any]:

@@ -114,6 +114,12 @@ class View:
         image[self.index] = values
         return image.reshape(*self.shape, *values.shape[1:])
 
+    def some(self, which: np.ndarray) -> "View":
+        """The view of some of its usable pixels alone: their places (n,), or a mask of them all."""
+        fields = ("target", "noise", "position", "normal", "tangent", "uv", "view", "index")
+        kept = {name: getattr(self, name)[which] for name in fields if getattr(self, name) is not None}
+        return dataclasses.replace(self, **kept)
+
     def check(self, stack: Stack) -> None:
         """Raise `InputError` for a material that cannot be drawn here: one with a grain, where nothing says which way it runs."""
         oriented = [f"{layer.name}.{grain(layer)}" for layer in (*stack.layers, stack.base) if grain(layer)]

@@ -151,8 +151,8 @@ class Scene:
     fit: FitRequest
 
 
-def read_scene(path: str | Path) -> Scene:
-    """Read a scene file (TOML or JSON). Raises `InputError` naming the key at fault."""
+def read_scene(path: str | Path, start: Stack | None = None) -> Scene:
+    """Read a scene file (TOML or JSON); `start` stands in for its [material] where it has none. Raises `InputError` naming the key at fault."""
     path = Path(path)
     document = read_document(path)
     where = str(path)
@@ -164,7 +164,7 @@ def read_scene(path: str | Path) -> Scene:
     return Scene(
         path,
         tuple(r for k, entry in enumerate(entries) for r in _references(entry, document, path, f"{where}: reference[{k}]")),
-        _start(document.get("material"), path),
+        start if start is not None and "material" not in document else _start(document.get("material"), path),
         _fit(document.get("fit", {}), f"{where}: fit"),
     )
 

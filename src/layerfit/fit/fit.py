@@ -156,9 +156,11 @@ class _Fit:
         self.blocks = [_weighted(block, w) for block, w in zip(self.blocks, weight, strict=True)]
 
     def _even(self, samples: Sequence[Samples]) -> list[np.ndarray]:
-        """Weights before there is a model."""
-        first = "uniform" if self.curves[0] is None else self.metric
-        return [inverse_sigma(s.target, s.target, None, first) for s in samples]
+        """Weights before there is a model. A measurement has no noise to speak of, and a highlight a thousand times as bright as all else:
+        there the law holds from the first."""
+        plain = ["law" if s.shape is None else "uniform" for s in samples]
+        first = plain if self.curves[0] is None else [self.metric] * len(samples)
+        return [inverse_sigma(s.target, s.target, None, metric) for s, metric in zip(samples, first, strict=True)]
 
     def _weights(self, models: Sequence[np.ndarray], metric: str) -> list[np.ndarray]:
         """Weights of the residuals of these models, a reference each."""

@@ -19,8 +19,10 @@ td:nth-child(n+2) { font-variant-numeric: tabular-nums; } pre { overflow-x: auto
 """
 
 
-def page(name: str, document: Mapping[str, Any], picture: bytes, convergence: bytes, shader: str) -> str:
-    """The report as HTML with its pictures inside; it makes no request."""
+def page(
+    name: str, document: Mapping[str, Any], picture: bytes, convergence: bytes, shader: str, planes: bytes | None = None
+) -> str:
+    """The report as HTML with its pictures inside; it makes no request. `planes` is of a measured BRDF."""
     text = html.escape("\n".join(lines(document)))
     return f"""<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -30,6 +32,7 @@ def page(name: str, document: Mapping[str, Any], picture: bytes, convergence: by
 <figure><img alt="reference, fit, shader and difference side by side" src="data:image/png;base64,{base64.b64encode(picture).decode()}">
 <figcaption class=soft>All at one exposure: the 99th percentile of the reference is white. The difference is that of the shader from the
 reference, where pixels are compared.</figcaption></figure>
+{"" if planes is None else _planes(planes)}
 <h2>Parameters</h2>
 {words.table(document["parameters"])}
 <p class=soft>Sigmas are {html.escape(document["sigma_is"])}.</p>
@@ -40,6 +43,11 @@ reference, where pixels are compared.</figcaption></figure>
 <details><summary>Shader</summary><pre>{html.escape(shader)}</pre></details>
 </html>
 """
+
+
+def _planes(picture: bytes) -> str:
+    return f"""<figure><img alt="measured values and the fit in planes of incidence" src="data:image/png;base64,{base64.b64encode(picture).decode()}">
+<figcaption class=soft>In the plane of incidence; the mirror side is positive.</figcaption></figure>"""
 
 
 def _verdict(document: Mapping[str, Any]) -> str:

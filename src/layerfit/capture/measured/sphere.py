@@ -47,16 +47,8 @@ def sphere_of(view: MeasuredView) -> View:
     )
     samples = seen.samples()
     f, near = interpolated(view.brdf, samples.wi[:, 0].astype(float), samples.wo.astype(float))
-    return _narrowed(seen, np.where(near[:, None], f * samples.weight[:, 0], 0.0), near)
-
-
-def _narrowed(view: View, target: np.ndarray, kept: np.ndarray) -> View:
-    """The view of some of its pixels alone, with their colours."""
-    picture = view.image(target)
-    per_pixel = ("position", "normal", "tangent", "uv", "view", "index")
-    return dataclasses.replace(
-        view, target=target[kept], picture=picture, **{name: getattr(view, name)[kept] for name in per_pixel}
-    )
+    target = np.where(near[:, None], f * samples.weight[:, 0], 0.0)
+    return dataclasses.replace(seen, target=target, picture=seen.image(target)).some(near)
 
 
 def interpolated(brdf: MeasuredBrdf, wi: np.ndarray, wo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -34,6 +34,10 @@ class MeasuredView:
         """(n, 3) BRDF times cosine [1/sr]."""
         return self.brdf.f[self.index] * self.brdf.wi[self.index, 2:]
 
+    def some(self, which: np.ndarray) -> "MeasuredView":
+        """The view of some of its samples alone: their places (n,), or a mask of them all."""
+        return dataclasses.replace(self, index=self.index[which])
+
     def check(self, stack: Stack) -> None:
         """Raise `InputError` for a material that this measurement says nothing of."""
         oriented = [f"{layer.name}.{grain(layer)}" for layer in (*stack.layers, stack.base) if grain(layer)]
