@@ -9,6 +9,7 @@
 - Spectra: metal gives the index of a named Metal, absorption_rgb the Absorption of a coat, both in three channels with their error.
 - References: read_scene gives a Scene, load its View of each reference, from which Samples are drawn; inspect says what a file holds.
   read_brdf gives a MeasuredBrdf.
+- Before a fit: advise gives an Advice, what a capture determines and which further image would tell most.
 - Fitting: fit gives a FitResult, parameters its values with sigmas; fit_scene does what `layerfit fit` does; image_error compares pictures.
 - Structures: choose_structure tries candidates and gives a StructureChoice; structures_of does what `layerfit structures` does.
 - Rendering: predict gives pixels, radiance the same traced, brdf the plain function; Place is where on the surface.

@@ -9,6 +9,7 @@ from .capture.measured.read import read_brdf as read_brdf
 from .capture.samples import Samples as Samples, View as View
 from .capture.scene import Scene as Scene, read_scene as read_scene
 from .errors import InputError as InputError, LayerfitError as LayerfitError, MachineError as MachineError
+from .fit.advise import Advice as Advice, advise as advise
 from .fit.fit import fit as fit
 from .fit.metrics import image_error as image_error
 from .fit.result import FitResult as FitResult, parameters as parameters

@@ -194,6 +194,41 @@ def structures(
 
 
 @app.command()
+def advise(
+    scene: Scene,
+    preset: Annotated[
+        Path | None,
+        typer.Option("--preset", help="The material to ask about, such as a fitted one; left out, the scene's start."),
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for advice.json and advice.png.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Say what the images of a scene determine of its material, and which further light, camera or thickness would help most.
+
+    Exit code 1: something that is free is not determined.
+
+    Example: `layerfit advise examples/references/varnished_wood.toml -o out/advice`
+    """
+    from .cache import use_compilation_cache
+
+    use_compilation_cache()
+    from .capture.scene import read_scene
+    from .job import write_advice
+    from .preset import read_preset
+    from .report.advice import lines
+
+    with _progress() as report:
+        document = write_advice(read_scene(scene), None if preset is None else read_preset(preset), output, report)
+    for line in lines(document):
+        _say(line)
+    if output is not None:
+        _say(f"Wrote advice.png and advice.json in {output}/")
+    if as_json:
+        _emit(document)
+    raise typer.Exit(0 if all(row["identifiable"] for row in document["parameters"].values()) else 1)
+
+
+@app.command()
 def render(
     preset: Preset,
     scene: Scene,

@@ -19,6 +19,7 @@ from .capture.samples import QUADRATURE, Samples, View
 from .capture.scene import Scene, read_scene
 from .documents import check_directory, finite, write_bytes, write_text
 from .errors import InputError
+from .fit.advise import advise
 from .fit.fit import fit
 from .fit.metrics import exposure, image_error
 from .fit.residuals import scaled
@@ -29,7 +30,7 @@ from .forms.accuracy import against_walk
 from .forms.precise import Precise, refuses
 from .preset import model_name, preset_of
 from .render import predict
-from .report import html, pictures, planes
+from .report import advice, html, pictures, planes
 from .shader.export import Shader, print_material
 from .shader.gl import renderer
 from .shader.verify import FLOOR, MAX_REL, P999_REL, Parity, check_image, check_pairs, compare, shade_samples, together
@@ -312,6 +313,18 @@ def _summary(document: dict[str, Any]) -> dict[str, Any]:
         "error": document["error"],
         "parity": document["parity"],
     }
+
+
+def write_advice(scene: Scene, stack: Stack | None, directory: Path | None, progress: Progress) -> dict[str, Any]:
+    """What the images of a scene tell and which further ones would; `advice.json` and `advice.png` in a directory, if there is one."""
+    if directory is not None:
+        check_directory(directory)
+    found = advise(scene, stack, progress=progress)
+    document = advice.document(found)
+    if directory is not None:
+        write_bytes(directory / "advice.png", advice.light_map(found.candidates))
+        write_text(directory / "advice.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
+    return document
 
 
 PICTURES = (".exr", ".png")

@@ -38,7 +38,8 @@ def _line(name: str, row: Mapping[str, Any]) -> str:
     value, sigma = measured(row["value"], row["sigma"])
     notes = [f"start {number(row['start'])}"] if "start" in row else []
     notes += [f"corrected {measured(row['corrected'], row['sigma'])[0]}"] if "corrected" in row else []
-    return f"    {name + ':':<26} {value} +/- {sigma}{_unit(row, ' ')}  ({', '.join([*notes, *states(row)])})"
+    said = ", ".join([*notes, *states(row)])
+    return f"    {name + ':':<26} {value} +/- {sigma}{_unit(row, ' ')}" + (f"  ({said})" if said else "")
 
 
 def table(rows: Mapping[str, Mapping[str, Any]]) -> str:
