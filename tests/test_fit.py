@@ -14,7 +14,7 @@ from layerfit.capture.scene import Camera, Constant, Directional, Reference, Sph
 from layerfit.errors import InputError
 from layerfit.fit.fit import fit
 from layerfit.fit.residuals import scaled
-from layerfit.fit.result import to_json
+from layerfit.fit.result import parameters, to_json
 from layerfit.fit.weights import inverse_sigma, noise_law, robust
 from layerfit.fit.words import measured
 from layerfit.layers import Coat
@@ -333,3 +333,27 @@ def test_robust_factors_leave_the_bulk_and_lower_the_tail(loss):
     factor = robust(residual, loss)
     assert np.all(factor[0] < 0.2)
     assert np.median(factor) > 0.9
+
+
+@pytest.mark.parametrize("model_error", [False, True])
+def test_the_scale_of_the_lights_is_fitted_where_it_is_named(see, model_error):
+    """A coat over a metal of known index tells how bright its light is, by channel."""
+    view = see(noise=0.01)
+    scale = np.array([1.4, 1.1, 0.7])
+    brighter = dataclasses.replace(view, target=(view.target * scale).astype(np.float32))
+    free = ["coat.alpha", "coat.tau", "base.alpha", "light.scale"]
+    result = fit([brighter], dataclasses.replace(START, layers=TRUTH.layers), free=free, starts=2, model_error=model_error)
+    row = parameters(result)["light.scale"]
+    np.testing.assert_allclose(result.light, row["value"], rtol=1e-5)
+    assert np.all(np.abs(np.subtract(row["value"], scale)) < 4.0 * np.asarray(row["sigma"])), row
+    assert np.all(np.asarray(row["sigma"]) < (0.3 if model_error else 0.1) * scale)
+    samples = view.relit(result.light).samples()
+    np.testing.assert_allclose(predict(result.stack, *samples.arrays[:3]), result.models[0], rtol=1e-4)
+
+
+def test_a_scale_that_cannot_be_told_from_a_colour_is_named(see):
+    """Twice the light on half the albedo is the same image."""
+    result = fit(
+        [see(Stack((), Lambert(albedo=0.5)))], Stack((), Lambert(albedo=0.3)), free=["base.albedo", "light.scale"], starts=1
+    )
+    assert any("base.albedo and light.scale" in row["why"] for row in document(result)["unidentified"])

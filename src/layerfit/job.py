@@ -94,7 +94,8 @@ def fit_scene(
     fitted = time.perf_counter()
     name = path.stem
     shader = print_material(result.stack, name)
-    drawings = draw_all(result.views, load(scene, 0.0), shader)
+    compared, drawn = ([view.relit(result.light) for view in views] for views in (result.views, load(scene, 0.0)))
+    drawings = draw_all(compared, drawn, shader)
     parity = together([*(drawing.parity for drawing in drawings), check_pairs(shader)])
     verified = time.perf_counter()
     picture = pictures.strip([drawing.row() for drawing in drawings])

@@ -14,7 +14,7 @@ from .exr import read_exr
 from .geometry import Surface, frames, normalise, sphere_surface, sphere_tangent, sphere_uv
 from .lights import is_exact, receive
 from .png import read_png
-from .scene import Reference
+from .scene import Reference, brighter
 
 QUADRATURE = 992
 """Directions a pixel for light that is not a point: a pixel is off by 1 % (rms) under the studio map of the examples, with a coat of width .1."""
@@ -138,6 +138,12 @@ class View:
     def scales(self, stack: Stack) -> np.ndarray | None:
         """Thickness of each layer in this image over that of the material, the base last, or None where all are 1."""
         return layer_scales(self.reference.thickness_scale, stack)
+
+    def relit(self, scale: np.ndarray) -> "View":
+        """The same view under lights that are `scale` (3,) times as bright."""
+        return dataclasses.replace(
+            self, reference=dataclasses.replace(self.reference, lights=brighter(self.reference.lights, scale))
+        )
 
     def moved(self, which: np.ndarray, dx: float, dy: float) -> "View":
         """Some pixels, seen at a place beside their centres: `dx`, `dy` in pixels, along the surface that their neighbours show."""

@@ -85,6 +85,24 @@ class EnvironmentMap:
 
 Light = Directional | Point | Constant | SphereLight | EnvironmentMap
 
+BRIGHTNESS = {
+    Directional: "irradiance_rgb",
+    Point: "intensity_rgb",
+    Constant: "radiance_rgb",
+    SphereLight: "radiance_rgb",
+    EnvironmentMap: "scale",
+}
+"""What says how bright a light is."""
+
+
+def brighter(lights: tuple[Light, ...], scale: Any) -> tuple[Light, ...]:
+    """The same lights, `scale` (3,) times as bright."""
+    return tuple(
+        dataclasses.replace(light, **{name: tuple(np.multiply(getattr(light, name), scale).tolist())})
+        for light in lights
+        for name in [BRIGHTNESS[type(light)]]
+    )
+
 
 @dataclasses.dataclass(frozen=True)
 class Reference:

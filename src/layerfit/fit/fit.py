@@ -12,7 +12,7 @@ from .. import render
 from .._compiled import CLOCK
 from .._place import narrowed
 from ..capture.load import AnyView
-from ..capture.samples import QUADRATURE, Samples
+from ..capture.samples import QUADRATURE, Samples, View
 from ..capture.scene import METRICS
 from ..documents import nearest
 from ..errors import InputError
@@ -20,7 +20,7 @@ from ..stack import Stack
 from . import discrepancy
 from .blocks import Block, arrange, channels_first
 from .difference import Curve, compared, curve, slope
-from .parameters import parametrise, with_fixed
+from .parameters import LIGHT, parametrise, with_fixed
 from .residuals import NEAR, begin, depths, initial, rows, scaled, step
 from .result import FitResult, Held, Row
 from .solve import NormalLevenbergMarquardt
@@ -81,6 +81,8 @@ class _Fit:
         self.start = start.astype(np.float32)
         for view in views:
             view.check(start)
+            if LIGHT in [f.name for f in self.free.free] and not isinstance(view, View):
+                raise InputError(f"{where}.free: {view.reference.path} is a measured BRDF and has no lights; leave {LIGHT} out")
         self.views, self.metric, self.loss, self.starts, self.seed, self.where = views, metric, loss, starts, seed, where
         self.model_error, self.progress = model_error, progress
         self.trace: list[Row] = []
@@ -123,6 +125,7 @@ class _Fit:
         clock = CLOCK.since(self.clock)
         return FitResult(
             stack=self._material(u),
+            light=self._light(u),
             start=self.start,
             free=self.free,
             vector=u,
@@ -173,15 +176,20 @@ class _Fit:
         return values
 
     def _models(self, u: np.ndarray, samples: Sequence[Samples]) -> list[np.ndarray]:
-        stack = self._material(u)
+        stack, light = self._material(u), self._light(u)
         return [
-            render.predict(scaled(stack, view.scales(stack)), s.wi, s.wo, s.weight, narrowed(s.place, stack.needs))
+            light * render.predict(scaled(stack, view.scales(stack)), s.wi, s.wo, s.weight, narrowed(s.place, stack.needs))
             for view, s in zip(self.views, samples, strict=True)
         ]
 
     def _material(self, u: np.ndarray) -> Stack:
         stack = self.free.put(self.start, self.free.fields(u), np)
         return jax.tree.map(lambda a: np.asarray(a, np.float32), stack)
+
+    def _light(self, u: np.ndarray) -> np.ndarray:
+        """All lights over what the scene says of them, (3,)."""
+        found = self.free.light(self.free.fields(u), np)
+        return np.ones(3, np.float32) if found is None else found.astype(np.float32)
 
     def _step(self, u: Any, state: Any, blocks: Sequence[Block]) -> Any:
         return step(u, state, self.bounds, self.start, blocks, free=self.free, solver=self.solver)
@@ -287,7 +295,9 @@ class _Fit:
         place = self.layout.reference.ravel(), self.layout.pixel.ravel()
         slopes = self.layout.scatter([slope(m, by) for m, by in zip(models, self.curves, strict=True)], 0.0).reshape(-1, 3)
         weights = np.concatenate([np.asarray(block.inverse_sigma).T for block in self.blocks])
-        return discrepancy.measure(stack, self.views, self.samples, place, jacobian, slopes * weights, gram, held, self.seed)
+        return discrepancy.measure(
+            stack, self.views, self.samples, place, jacobian, slopes * weights * self._light(u), gram, held, self.seed
+        )
 
     def _sectors(self) -> np.ndarray:
         """Sector of the image that each pixel of the blocks is in, around the highlight: each has its share of every half angle."""

@@ -19,8 +19,8 @@ class Free:
     """One fitted field of a layer: a number, or one a channel."""
 
     name: str
-    layer: int
-    """Place in (*layers, base)."""
+    layer: int | None
+    """Place in (*layers, base); None for what is of the lights."""
     field: str
     spec: Param
     slots: tuple[int, ...]
@@ -66,7 +66,7 @@ class Parametrisation:
         u = np.empty(self.size)
         layers = (*stack.layers, stack.base)
         for f in self.free:
-            u[list(f.slots)] = f.to_steps(getattr(layers[f.layer], f.field))
+            u[list(f.slots)] = f.to_steps(1.0 if f.layer is None else getattr(layers[f.layer], f.field))
         return np.clip(u, *self.bounds())
 
     def fields(self, u: Any) -> list[Any]:
@@ -77,8 +77,15 @@ class Parametrisation:
         """The material with its free fields replaced; `fields` as `fields` gives them."""
         layers = [*stack.layers, stack.base]
         for f, u in zip(self.free, fields, strict=True):
+            if f.layer is None:
+                continue
             layers[f.layer] = dataclasses.replace(layers[f.layer], **{f.field: f.from_steps(u, xp)})
         return dataclasses.replace(stack, layers=tuple(layers[:-1]), base=layers[-1])
+
+    def light(self, fields: Sequence[Any], xp: Any = jnp) -> Any:
+        """What the lights of the scene are multiplied by, one a channel; None where they are known."""
+        found = (f.from_steps(u, xp) for f, u in zip(self.free, fields, strict=True) if f.layer is None)
+        return next(found, None)
 
     def values(self, u: np.ndarray) -> dict[str, Any]:
         """Fitted values by name."""
@@ -93,6 +100,12 @@ class Parametrisation:
         lower = [float(f.to_steps(f.spec.lower)) for f in self.free for _ in f.slots]
         upper = [float(f.to_steps(f.spec.upper)) for f in self.free for _ in f.slots]
         return np.array(lower), np.array(upper)
+
+
+LIGHT = "light.scale"
+"""All lights of a scene over what it says of them, by channel: a nuisance, fitted where it is named."""
+
+_LIGHT = Param(1.0, 0.01, 100.0, "log", "all lights over what the scene says of them", colour=True, fitted=False)
 
 
 def known_parameters(stack: Stack) -> dict[str, tuple[int, str, Param]]:
@@ -132,23 +145,24 @@ def _is_number(value: Any, spec: Param) -> bool:
 
 def parametrise(stack: Stack, free: Sequence[str] | None, fixed: Sequence[str], where: str) -> tuple[Stack, Parametrisation]:
     """Choose the free fields. Colours that a fit frees are widened to three channels, so the material is returned too."""
-    known = known_parameters(stack)
+    known = {**known_parameters(stack), LIGHT: (None, "scale", _LIGHT)}
     names = free_by_default(stack) if free is None else tuple(free)
     for name in names:
         if name not in known:
             raise InputError(
-                f"{where}.free: unknown parameter {name!r}{nearest(name, known)}. This material has {', '.join(known)}"
+                f"{where}.free: unknown parameter {name!r}{nearest(name, known)}. "
+                f"This material has {', '.join(known_parameters(stack))}; of the scene there is {LIGHT}"
             )
     if free is not None and (both := set(free) & set(fixed)):
         raise InputError(f"{where}: {', '.join(sorted(both))} cannot be both free and fixed")
     names = tuple(name for name in known if name in names and name not in fixed)
     if not names:
-        raise InputError(f"{where}.free: nothing is left to fit; this material has {', '.join(known)}")
+        raise InputError(f"{where}.free: nothing is left to fit; this material has {', '.join(known_parameters(stack))}")
     chosen, slot = [], 0
     layers = [*stack.layers, stack.base]
     for name in names:
         k, field, spec = known[name]
-        if spec.colour:
+        if k is not None and spec.colour:
             value = np.broadcast_to(np.asarray(getattr(layers[k], field), float), 3)
             layers[k] = dataclasses.replace(layers[k], **{field: value})
         width = 3 if spec.colour else 1

@@ -33,15 +33,21 @@ def scaled(stack: Stack, scale: Any) -> Stack:
 
 
 def _material(u: Any, start: Stack, scale: Any, *, free: Parametrisation) -> tuple[Any, Any]:
-    """The material at `u`, prepared, and its derivatives."""
-    return tangents(lambda fields: scaled(free.put(start, fields).astype(u.dtype), scale).prepare(), free.fields(u))
+    """The material at `u`, prepared, with what the lights are multiplied by; and the derivatives of both."""
+
+    def made(fields: Any) -> Any:
+        return scaled(free.put(start, fields).astype(u.dtype), scale).prepare(), free.light(fields)
+
+    return tangents(made, free.fields(u))
 
 
 def _columns(material: tuple[Any, Any], block: Block, *, form: Any) -> Any:
     """The model's derivatives and residual over one block of pixels, in the precision of the block."""
 
-    def residual(prepared: Any) -> Any:
+    def residual(made: Any) -> Any:
+        prepared, light = made
         model = shade(prepared, block.wi, block.wo, block.weight, block.place, form=form)
+        model = model if light is None else model * light[:, None]
         if block.curve is None:
             return (model - block.target) * block.inverse_sigma
         return (block.curve(model) - block.curve(block.target)) * block.inverse_sigma
@@ -64,7 +70,8 @@ _solver_step = Compiled(_advance, optimise=1)
 def begin(u: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation) -> None:
     """Have what a step needs compiled, while other work goes on."""
     with jax.enable_x64(False):
-        made = prepared.begin(scaled(start.astype(np.float32), blocks[0].scale))
+        lit = free.light(free.fields(np.asarray(u, np.float32)), np)
+        made = prepared.begin(scaled(start.astype(np.float32), blocks[0].scale)), lit
     # The larger part first; that of the material goes on beside it.
     along = jax.tree.map(lambda a: jax.ShapeDtypeStruct((len(free.free), *a.shape), a.dtype), made)
     _block_columns.begin((made, along), blocks[0], form=start.form)

@@ -55,6 +55,8 @@ class FitResult:
     """A fitted material and what is known of it."""
 
     stack: Stack
+    light: np.ndarray
+    """All lights over what the scene says of them, (3,): 1 but where `light.scale` is free."""
     start: Stack
     free: Parametrisation
     vector: np.ndarray

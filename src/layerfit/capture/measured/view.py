@@ -52,6 +52,10 @@ class MeasuredView:
                 "measured. Start from a material that is the same everywhere"
             )
 
+    def relit(self, scale: np.ndarray) -> "MeasuredView":
+        """The same: a measured BRDF has no lights."""
+        return self
+
     def scales(self, stack: Stack) -> np.ndarray | None:
         """Thickness of each layer of this sample over that of the material, the base last, or None where all are 1."""
         return layer_scales(self.reference.thickness_scale, stack)
