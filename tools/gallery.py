@@ -75,7 +75,8 @@ def scene() -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray, lf.Pl
     wi = (received.to_light @ to_surface.swapaxes(1, 2)).astype(np.float32)
     wo = np.einsum("nij,nj->ni", to_surface, view).astype(np.float32)
     uv = np.add(sphere_uv(normal, CAMERA.up), (0.5, 0.0)) % 1.0  # the seam behind
-    place = lf.Place(uv.astype(np.float32), np.linalg.norm(away, axis=-1).astype(np.float32))
+    sky = 0.5 + 0.5 * normal @ np.asarray(CAMERA.up)  # what a sphere in the open sees of it
+    place = lf.Place(*(x.astype(np.float32) for x in (uv, np.linalg.norm(away, axis=-1), sky)))
     return surface.covered, (wi, wo, received.weight.astype(np.float32), place)
 
 
