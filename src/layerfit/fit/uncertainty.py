@@ -34,7 +34,7 @@ class Uncertainty:
 
     @property
     def correlation(self) -> np.ndarray:
-        scale = np.where(self.sigma > 0.0, self.sigma, 1.0)
+        scale = np.where((self.sigma > 0.0) & np.isfinite(self.sigma), self.sigma, 1.0)
         return self.covariance / scale[:, None] / scale[None, :]
 
 

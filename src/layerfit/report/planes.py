@@ -19,8 +19,11 @@ NEAR_DEG, BESIDE_DEG = 5.0, 8.0
 FEWEST = 8
 """Samples that make a panel."""
 
-DECADES = 5.0
-"""That are shown below the largest value: below them is noise."""
+DARKEST = 0.05
+"""Part of the values that may lie below the scale: they are noise, or clipped."""
+
+DECADES = 2.0, 7.0
+"""That are shown, at least and at most."""
 
 CHANNELS = (230, 97, 60), (90, 190, 120), (86, 160, 233)
 _SCALE = 2  # drawn larger and reduced, which smooths the lines
@@ -63,22 +66,24 @@ def planes(brdf: MeasuredBrdf, model: Callable[[np.ndarray, np.ndarray], np.ndar
 
 def drawn(found: Sequence[Plane], name: str) -> bytes:
     """The panels side by side as a PNG, values on a logarithmic scale."""
-    canvas = Image.new("RGB", (_SCALE * _WIDTH * max(len(found), 1), _SCALE * _HEIGHT), BACKGROUND)
+    canvas = Image.new("RGB", (_SCALE * _WIDTH * len(found), _SCALE * _HEIGHT), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     font = ImageFont.load_default(12 * _SCALE)
-    tops = [max(float(p.measured.max()), 1e-12) for p in found]
-    top = np.ceil(np.log10(max(tops, default=1.0)))
+    values = np.concatenate([plane.measured[plane.measured > 0.0] for plane in found])
+    top = float(np.ceil(np.log10(values.max())))
+    bottom = float(np.clip(np.floor(np.log10(np.quantile(values, DARKEST))), top - DECADES[1], top - DECADES[0]))
     for k, plane in enumerate(found):
-        _panel(draw, font, k * _WIDTH, plane, top)
+        _panel(draw, font, k * _WIDTH, plane, (bottom, top))
     draw.text((_SCALE * _LEFT, _SCALE * 4), f"{name}: dots measured, lines fitted [1/sr]", fill=INK, font=font)
     return png(canvas.reduce(_SCALE))
 
 
-def _panel(draw: ImageDraw.ImageDraw, font: Any, x0: int, plane: Plane, top: float) -> None:
+def _panel(draw: ImageDraw.ImageDraw, font: Any, x0: int, plane: Plane, scale: tuple[float, float]) -> None:
     left, right, high, low = x0 + _LEFT, x0 + _WIDTH - _RIGHT, _TOP, _HEIGHT - _LOW
     to_x = lambda a: _SCALE * (left + (a + 90.0) / 180.0 * (right - left))  # noqa: E731
-    to_y = lambda f: _SCALE * np.clip(high + (top - np.log10(np.maximum(f, 1e-30))) / DECADES * (low - high), high, low)  # noqa: E731
-    for decade in np.arange(top - DECADES, top + 1.0):
+    bottom, top = scale
+    to_y = lambda f: _SCALE * np.clip(high + (top - np.log10(np.maximum(f, 1e-30))) / (top - bottom) * (low - high), high, low)  # noqa: E731
+    for decade in np.arange(bottom, top + 1.0):
         y = float(to_y(10.0**decade))
         draw.line([(_SCALE * left, y), (_SCALE * right, y)], fill=LINE, width=_SCALE)
         draw.text((_SCALE * (left - 6), y), f"{10.0**decade:g}", fill=INK, font=font, anchor="rm")
