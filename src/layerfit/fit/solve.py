@@ -5,6 +5,8 @@ a field (a scalar, or a colour with all its channels at once) gives every column
 accumulated from the columns without a tall matrix ever being factored. Sums are float64.
 """
 
+import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -102,24 +104,9 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     search: optx.AbstractSearch = optx.ClassicalTrustRegion()
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):
-        n = y.size
-        # Numbers of NumPy, put on the device: nothing here is worth a compiler's time.
-        zero = np.zeros(())
-        empty = self._info(zero, np.zeros(n), np.eye(n))
+        rest = _at_rest(self, y.size)
         trust = np.asarray(options.get("trust", 1.0), float)
-        search = jax.tree.map(lambda a: np.zeros(a.shape, a.dtype), jax.eval_shape(self.search.init, y, empty))
-        state = _State(
-            first=np.array(True),
-            y_eval=y,
-            loss=zero,
-            gradient=np.zeros(n),
-            gram=np.eye(n),
-            search=eqx.tree_at(lambda s: s.step_size, search, trust),
-            step_size=trust,
-            done=np.array(False),
-            result=optx.RESULTS.successful,
-        )
-        return jax.device_put(state)
+        return dataclasses.replace(rest, y_eval=y, step_size=trust, search=dataclasses.replace(rest.search, step_size=trust))
 
     def step(self, fn, y, args, options, state, tags):
         lower, upper = options["lower"], options["upper"]
@@ -175,3 +162,24 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
 
     def postprocess(self, fn, y, aux, args, options, state, tags, result):
         return y, aux, {}
+
+
+@functools.cache
+def _at_rest(solver: NormalLevenbergMarquardt, n: int) -> _State:
+    """State before the first step, of n parameters: numbers of NumPy, for nothing here is worth a compiler's time."""
+    zero = np.zeros(())
+    info = solver._info(zero, np.zeros(n), np.eye(n))
+    search = jax.eval_shape(solver.search.init, np.zeros(n), info)
+    return jax.device_put(
+        _State(
+            first=np.array(True),
+            y_eval=np.zeros(n),
+            loss=zero,
+            gradient=np.zeros(n),
+            gram=np.eye(n),
+            search=jax.tree.map(lambda a: np.zeros(a.shape, a.dtype), search),
+            step_size=zero,
+            done=np.array(False),
+            result=optx.RESULTS.successful,
+        )
+    )
