@@ -88,6 +88,13 @@ def fit(
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")] = None,
     metric: Annotated[str | None, typer.Option(help="law, uniform, relative, log or cube_root.")] = None,
     loss: Annotated[str | None, typer.Option(help="square, huber or cauchy.")] = None,
+    profile: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--profile",
+            help="Parameter whose 95 % interval is found by fitting the others again, such as coat.tau; may be repeated.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Fit a material to a reference render or a measured BRDF.
@@ -107,7 +114,15 @@ def fit(
     _check_choice(metric, METRICS, "--metric")
     with _progress() as report:
         outcome = fit_scene(
-            scene, output, import_s=imported, progress=report, starts=starts, seed=seed, metric=metric, loss=loss
+            scene,
+            output,
+            import_s=imported,
+            progress=report,
+            profile=profile or (),
+            starts=starts,
+            seed=seed,
+            metric=metric,
+            loss=loss,
         )
     _show_fit(outcome, as_json)
     raise typer.Exit(0 if outcome.good else 1)

@@ -62,10 +62,12 @@ def fit_scene(
     *,
     import_s: float = 0.0,
     progress: Progress = lambda stage, share: None,
+    profile: Sequence[str] = (),
     **options: Any,
 ) -> Outcome:
     """Fit a scene, or its file, and write everything to `directory`; each file whole or not at all, `fit.json` last.
 
+    `profile` are parameters whose intervals are found by fitting the others again.
     `options` override the scene's [fit] table. Raises `LayerfitError` for input or a machine that is at fault.
     """
     began = time.perf_counter()
@@ -87,6 +89,7 @@ def fit_scene(
         starts=request.starts,
         seed=request.seed,
         model_error=True,
+        profile=profile,
         where=f"{path}: fit",
         progress=progress,
     )

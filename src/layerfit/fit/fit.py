@@ -21,11 +21,12 @@ from . import discrepancy
 from .blocks import Block, arrange, channels_first
 from .difference import Curve, compared, curve, slope
 from .parameters import LIGHT, parametrise, with_fixed
+from .profile import Profile, along, deep, lower_limit, scatter, threshold
 from .residuals import NEAR, begin, depths, initial, rows, scaled, step
 from .result import FitResult, Held, Row
 from .solve import NormalLevenbergMarquardt
 from .starts import FINE_STEPS, LEVEL, SCREENED, Minimum, distinct, in_sight, ranked, search, space_filling
-from .uncertainty import GROUPS, estimate
+from .uncertainty import GROUPS, Uncertainty, estimate
 from .weights import brightness, inverse_sigma, misfit, robust
 
 PIXELS = 65536
@@ -55,6 +56,7 @@ def fit(
     starts: int = 8,
     seed: int = 0,
     model_error: bool = False,
+    profile: Sequence[str] = (),
     where: str = "fit",
     progress: Callable[[str, float], None] = lambda stage, share: None,
 ) -> FitResult:
@@ -63,20 +65,26 @@ def fit(
     `free` are names such as "coat.alpha" (left out: what an image can tell), `fixed` are values by name. `metric` is "law", "uniform",
     "relative", "log" or "cube_root" (see `difference`), `loss` "square", "huber" or "cauchy". `starts` space-filling starts are tried beside
     the given one, all coarsely on few pixels, the best places that they reach to the end. With `model_error` sigmas hold what the form of the
-    model gets wrong, too: a random walk tells it, at the fitted material (see `discrepancy`). Raises `InputError` for what cannot be fitted.
+    model gets wrong, too: a random walk tells it, at the fitted material (see `discrepancy`). `profile` are names of parameters whose intervals
+    are found by fitting the others again (see `profile`). Raises `InputError` for what cannot be fitted.
     """
     if metric not in METRICS:
         raise InputError(f"{where}.metric = {metric!r}: should be one of {', '.join(METRICS)}{nearest(metric, METRICS)}")
     with jax.enable_x64(True):
-        return _Fit(views, start, free, fixed or {}, metric, loss, starts, seed, model_error, where, progress).run()
+        return _Fit(views, start, free, fixed or {}, metric, loss, starts, seed, model_error, profile, where, progress).run()
 
 
 class _Fit:
-    def __init__(self, views, start, free, fixed, metric, loss, starts, seed, model_error, where, progress):
+    def __init__(self, views, start, free, fixed, metric, loss, starts, seed, model_error, profile, where, progress):
         start = with_fixed(start, fixed, f"{where}.fixed")
         free, self.held = _without_gauge(start, free, views)
         start, self.free = parametrise(start, free, tuple(fixed), where)
         self.explicit = free is not None
+        names = [f.name for f in self.free.free]
+        if unknown := [name for name in profile if name not in names]:
+            raise InputError(
+                f"{where}: there is no profile of {unknown[0]!r}{nearest(unknown[0], names)}: it is not fitted; {', '.join(names)} are"
+            )
         self.notes: list[str] = []
         self.start = start.astype(np.float32)
         for view in views:
@@ -84,7 +92,7 @@ class _Fit:
             if LIGHT in [f.name for f in self.free.free] and not isinstance(view, View):
                 raise InputError(f"{where}.free: {view.reference.path} is a measured BRDF and has no lights; leave {LIGHT} out")
         self.views, self.metric, self.loss, self.starts, self.seed, self.where = views, metric, loss, starts, seed, where
-        self.model_error, self.progress = model_error, progress
+        self.model_error, self.profile, self.progress = model_error, profile, progress
         self.trace: list[Row] = []
         self.clock = dataclasses.replace(CLOCK)
         self.began = time.perf_counter()
@@ -122,6 +130,8 @@ class _Fit:
         uncertainty = estimate(gram, held, jacobian, residual, self._sectors())
         models = self._models(u, self.samples)
         off = self._discrepancy(u, models, jacobian, gram, held) if self.model_error else None
+        beyond = misfit(models, self.samples, self._weights(models, "law"))
+        profiles = self._profiles(best, beyond, uncertainty)
         clock = CLOCK.since(self.clock)
         return FitResult(
             stack=self._material(u),
@@ -141,12 +151,39 @@ class _Fit:
             notes=self.notes,
             trace=self.trace,
             models=models,
-            misfit=misfit(models, self.samples, self._weights(models, "law")),
+            misfit=beyond,
+            profiles=profiles,
             samples=self.samples,
             views=self.views,
             clock=clock,
             solve_s=time.perf_counter() - self.began - clock.trace_s - clock.compile_s,
         )
+
+    def _profiles(self, best: Minimum, misfit: float, uncertainty: Uncertainty) -> list[Profile]:
+        """Profiles of the parameters that were asked for; and of depths that are but lower limits."""
+        residuals = sum(s.target.size for s in self.samples)
+        unexplained, even = 0.5 * misfit**2 * self._brightness(self.blocks), 2.0 * best.cost / residuals
+        asked = [slot for f in self.free.free if f.name in self.profile for slot in f.slots]
+        deeper = [slot for slot in deep(self.free.free, self._material(best.vector)) if slot not in asked]
+        found: list[Profile | None] = []
+        for slot in (*asked, *deeper):
+            lower, upper = self.bounds[0][slot], self.bounds[1][slot]
+            first = float(np.clip(uncertainty.sigma[slot], 1e-3 * (upper - lower), 0.03 * (upper - lower)))
+            run = along if slot in asked else lower_limit
+            limit = threshold(max(even, scatter(best.gram, uncertainty.covariance, slot)), unexplained) + 1e-30
+            found.append(run(self._refit, best.vector, best.cost, slot, first, limit, (lower, upper)))
+        return [profile for profile in found if profile]
+
+    def _refit(self, u: np.ndarray, slot: int) -> tuple[np.ndarray, float]:
+        """Where all but one entry of the vector go from there, and the cost."""
+        kept = self.bounds
+        still = np.arange(len(u)) == slot
+        self.bounds = np.where(still, u, kept[0]), np.where(still, u, kept[1])
+        steps = len(self.trace)
+        reached, _ = self._descend(Minimum((0,), u, np.inf, np.eye(len(u))), self.blocks, FINE_STEPS, "profile")
+        self.bounds = kept
+        del self.trace[steps:]  # the fit had ended
+        return reached.vector, reached.cost
 
     def _weigh(self, u: np.ndarray | None) -> None:
         """Set the residual weights from the model at `u`, or equal ones before there is a model."""

@@ -14,7 +14,8 @@ from ..preset import left_out, rounded
 from ..stack import Stack
 from . import words
 from .discrepancy import Discrepancy
-from .parameters import Parametrisation
+from .parameters import Free, Parametrisation
+from .profile import ABSORBING, Profile
 from .starts import SIGHT, Minimum
 from .uncertainty import WEAK_SIGMA, Uncertainty, in_words
 
@@ -78,6 +79,8 @@ class FitResult:
     """Radiance of the fitted material at the usable pixels of each reference."""
     misfit: float
     """Weighted residual over the weighted image, without the noise that the files state."""
+    profiles: list[Profile]
+    """Of the parameters that were asked for, and of depths that are but lower limits."""
     samples: list[Samples]
     views: Sequence[AnyView]
     clock: Clock
@@ -122,10 +125,24 @@ def parameters(result: FitResult) -> dict[str, dict[str, Any]]:
         if known:
             rows[f.name] |= {key: _sigma(slopes[at] * part[at]) for key, part in _sigma_parts(result).items()}
             rows[f.name]["corrected"] = rounded(corrected[f.name])
+        ends = [_interval(result, f, slot) for slot in f.slots]
+        if any(ends):
+            rows[f.name]["interval_95"] = ends[0] if len(ends) == 1 else ends
+            rows[f.name]["lower_limit"] = f.field in ABSORBING and any(
+                end is not None and end[1] is None and end[0] for end in ends
+            )
     for layer in result.stack.layers:
         if getattr(layer, "absorption_per_mm", None) is not None:
             rows[f"{layer.name}.tau"] = _derived_tau(result, layer)
     return rows
+
+
+def _interval(result: FitResult, f: Free, slot: int) -> list[float | None] | None:
+    """Ends of the 95 % interval of one entry, in the units of the field: None for an end that there is none of, or without a profile."""
+    profile = next((p for p in result.profiles if p.slot == slot), None)
+    if profile is None:
+        return None
+    return [None if end is None else float(f"{float(f.from_steps(end, np)):.4g}") for end in profile.interval]
 
 
 def _at_bounds(result: FitResult) -> tuple[np.ndarray, np.ndarray]:
@@ -210,11 +227,25 @@ def minima(result: FitResult) -> list[dict[str, Any]]:
     ]
 
 
+def profiles(result: FitResult) -> list[dict[str, Any]]:
+    """The cost along parameters, over the rise that ends their 95 % interval."""
+    fields = {slot: f for f in result.free.free for slot in f.slots}
+    return [
+        {
+            "parameter": result.free.names[p.slot],
+            "values": rounded(fields[p.slot].from_steps(p.at, np)),
+            "rise": [float(f"{rise:.4g}") for rise in p.rise],
+        }
+        for p in result.profiles
+    ]
+
+
 def flags(result: FitResult, rows: dict[str, dict[str, Any]], pairs: list[list[Any]]) -> list[str]:
     """What a reader should know before using the values; empty for a fit without blemish."""
     found = [] if result.converged else ["not_converged"]
     found += ["poor_fit"] if result.misfit > POOR else []
     found += [f"at_bound:{name}" for name, row in rows.items() if row.get("at_bound")]
+    found += [f"lower_limit:{name}" for name, row in rows.items() if row.get("lower_limit")]
     found += [f"not_identifiable:{name}" for name, row in rows.items() if row.get("identifiable") is False]
     found += [f"correlated:{a}~{b}" for a, b, r in pairs if abs(r) > 0.95]
     if unidentified(result):
@@ -251,6 +282,7 @@ def to_json(
         "steps": result.steps,
         "starts": sum(len(m.starts) for m in result.minima),
         "minima": minima(result),
+        "profiles": profiles(result),
         "pixels": {
             "used": sum(len(s.index) for s in result.samples),
             "dropped": [view.dropped for view in result.views],

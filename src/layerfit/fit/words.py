@@ -64,7 +64,16 @@ def states(row: Mapping[str, Any]) -> list[str]:
     """What a reader should know of a parameter."""
     found = [f"at its {row['at_bound']} bound"] if row.get("at_bound") else []
     found += ["not identifiable"] if row.get("identifiable") is False else []
+    found += [_interval(row)] if "interval_95" in row else []
     return found + ([f"= {row['derived']}"] if "derived" in row else [])
+
+
+def _interval(row: Mapping[str, Any]) -> str:
+    """A 95 % interval, or lower limits; a channel that has neither has a dash."""
+    ends = row["interval_95"] if len(row["interval_95"]) == 3 else [row["interval_95"]]
+    if row["lower_limit"]:
+        return f"at least {number([None if end is None else end[0] for end in ends])} (95 %)"
+    return "95 %: " + ", ".join(NONE if end is None else f"{number(end[0])} to {number(end[1])}" for end in ends)
 
 
 def number(value: Any) -> str:
