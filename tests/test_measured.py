@@ -23,6 +23,7 @@ from layerfit.fit.weights import brightness, inverse_sigma
 from layerfit.job import fit_scene
 from layerfit.optics.spectra import resampling, rgb_weights
 from layerfit.render import predict
+from layerfit.report.planes import planes
 from layerfit.stack import Stack
 from layerfit.surfaces import CookTorrance
 from measured_files import write_cornell, write_merl, write_rgl, write_table, write_tensors
@@ -305,6 +306,18 @@ def test_a_sphere_shows_what_was_measured(tmp_path):
     error = np.linalg.norm(sphere.target - wanted) / np.linalg.norm(wanted)
     assert len(sphere.index) > 3000
     assert error < 0.05
+
+
+def test_planes_of_incidence_have_the_mirror_on_their_right(tmp_path):
+    write_merl(tmp_path / "paint.binary", paint, (30, 30, 30))
+    found = planes(read_brdf(tmp_path / "paint.binary"), paint)
+    assert len(found) >= 4
+    for plane in found:
+        brightest = plane.outgoing_deg[np.argmax(plane.measured[:, 0])]
+        assert brightest > 0.0
+        model = np.interp(plane.outgoing_deg, plane.at_deg, plane.model[:, 0])
+        # Samples lie some degrees beside the plane and the incidence.
+        assert np.median(np.abs(model - plane.measured[:, 0]) / model) < 0.1
 
 
 @pytest.mark.parametrize("name", ["cayman.brdf", "krylon_blue.brdf", "cg_sunflower_rgb.bsdf", "paper_white_rgb.bsdf"])

@@ -126,6 +126,25 @@ def test_what_is_written_of_a_search(tmp_path, gl):
     np.testing.assert_allclose(fitted["coat.eta"]["value"], 1.5, rtol=1e-2)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["none.bsdf"], "cannot be read"),
+        (["a.csv", "--only", "coats"], "is not one of diffuse"),
+        (["a.csv", "--metric", "logs"], "is not law, uniform"),
+        (["scene.toml"], "there is no [reference]"),
+    ],
+)
+def test_a_fault_is_one_message_and_leaves_nothing(arguments, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    measurement(tmp_path, lambda wi, wo: values(TRUTHS["diffuse"], wi, wo))
+    (tmp_path / "scene.toml").write_text("")
+    ran = layerfit("structures", *arguments, "-o", "out")
+    assert ran.code == 2
+    assert said in ran.err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_scene_needs_no_material_for_it(tmp_path):
     measurement(tmp_path, lambda wi, wo: values(TRUTHS["diffuse"], wi, wo))
     (tmp_path / "scene.toml").write_text('[reference]\nbrdf = "a.csv"\n')
