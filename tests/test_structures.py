@@ -1,5 +1,6 @@
 """Which structure data support: known materials are recognised, and nothing is claimed that is not there."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -11,7 +12,8 @@ from layerfit.capture.load import load
 from layerfit.capture.measured.view import load_measured
 from layerfit.capture.scene import MeasuredReference, read_scene
 from layerfit.errors import InputError
-from layerfit.fit.structures import STRONG, choose_structure, effective
+from layerfit.fit.candidates import candidates
+from layerfit.fit.structures import STRONG, _asked, choose_structure, effective
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
 from layerfit.render import predict
@@ -88,6 +90,15 @@ def test_an_image_is_a_reference_too(tmp_path):
     choice = choose_structure([view], structures=SOME)
     assert choice.chosen.candidate.name == "coat_diffuse"
     np.testing.assert_allclose(choice.chosen.result.stack.layers[0].alpha, 0.15, rtol=0.02)
+
+
+def test_flakes_are_tried_where_they_can_be_drawn(tmp_path):
+    """Without texture coordinates, nothing says where on the surface a flake is."""
+    view = sphere_view(TRUTHS["diffuse"], tmp_path, 16)
+    known = candidates(np.array([0.5, 0.5, 0.5]))
+    names = lambda *views: {candidate.name for candidate in _asked(known, None, views)}  # noqa: E731
+    placed, measured = view, measurement(tmp_path, lambda wi, wo: values(TRUTHS["diffuse"], wi, wo))
+    assert names(placed, measured) - names(dataclasses.replace(view, uv=None)) == {"coat_flakes"}
 
 
 def test_residuals_that_are_alike_count_less():

@@ -67,6 +67,13 @@ def candidates(colour: np.ndarray) -> list[Candidate]:
             "two_lobes", "diffuse and two lobes", bare(paint_2), (*of_paint, "base.ks_2", "base.f0_2", "base.alpha_2"), "lobe"
         ),
         Candidate("coat_diffuse", "coat over diffuse", one(coat, diffuse), (*on_top, "base.albedo"), "diffuse"),
+        Candidate(
+            "tinted_diffuse",
+            "tinted coat over diffuse",
+            one(tinted, diffuse),
+            (*on_top, "coat.tau", "base.albedo"),
+            "coat_diffuse",
+        ),
         Candidate("coat_metal", "coat over metal", one(coat, metal), (*on_top, *of_metal), "metal"),
         Candidate("tinted_metal", "tinted coat over metal", one(tinted, metal), (*on_top, "coat.tau", *of_metal), "coat_metal"),
         Candidate("coat_flakes", "coat over flakes in pigment", any_(coat, flakes), (*on_top, *of_flakes)),

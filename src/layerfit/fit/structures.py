@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..capture.load import AnyView
+from ..capture.measured.view import MeasuredView
 from ..capture.samples import Samples
 from ..documents import nearest
 from ..errors import InputError
@@ -110,7 +111,7 @@ def choose_structure(
     thinned = [_thinned(view, seed) for view in views]
     samples = [view.samples() for view in thinned]
     results: dict[str, tuple[Candidate, FitResult]] = {}
-    listed = _asked(candidates(_colour(samples)), structures)
+    listed = _asked(candidates(_colour(samples)), structures, views)
     for k, candidate in enumerate(listed):
         progress(candidate.words, k / len(listed))
         if candidate.after in results:
@@ -122,12 +123,16 @@ def choose_structure(
     return _judged(list(results.values()), metric)
 
 
-def _asked(known: list[Candidate], names: Sequence[str] | None) -> list[Candidate]:
+def _asked(known: list[Candidate], names: Sequence[str] | None, views: Sequence[AnyView]) -> list[Candidate]:
+    """The candidates of these names; or all that can be drawn: what differs from place to place needs to know the place."""
+    if names is None:
+        placed = all(isinstance(view, MeasuredView) or view.uv is not None for view in views)
+        return [candidate for candidate in known if placed or not candidate.stack.reads]
     by_name = {candidate.name: candidate for candidate in known}
-    for name in names or ():
+    for name in names:
         if name not in by_name:
             raise InputError(f"structure {name!r} is not one of {', '.join(by_name)}{nearest(name, by_name)}")
-    return known if names is None else [candidate for candidate in known if candidate.name in names]
+    return [candidate for candidate in known if candidate.name in names]
 
 
 def _thinned(view: AnyView, seed: int) -> AnyView:
