@@ -12,7 +12,7 @@ import numpy as np
 from .parameters import Parametrisation
 
 SCREENED = 8
-"""Points that are looked at for each start that is taken. Films need them: of 60 fits from anywhere 53 found theirs without, 55 with four, all
+"""Points that are looked at for each start that is taken. Films need them: of 60 fits from anywhere 53 found theirs without, 55 with four, 60
 with eight. More starts of fewer steps, halved in between, found fewer in the same time."""
 
 COARSE_STEPS = 12
