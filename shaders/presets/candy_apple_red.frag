@@ -66,6 +66,32 @@ const Flakes lf_flakes = Flakes(
     0.0                                  // seed: whole number; another one, other flakes
 );
 
+// log(1 + x) without the cancellation near 0.
+float lf_log1p(float x) {
+    if (abs(x) > 0.3) {
+        return log(1.0 + x);
+    }
+    float s = x / (2.0 + x);
+    float u = s * s;
+    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+}
+
+vec3 lf_log1p(vec3 x) {
+    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
+}
+
+// exp(x) - 1 without the cancellation near 0.
+float lf_expm1(float x) {
+    if (abs(x) > 0.4) {
+        return exp(x) - 1.0;
+    }
+    return x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
+}
+
+vec3 lf_expm1(vec3 x) {
+    return vec3(lf_expm1(x.x), lf_expm1(x.y), lf_expm1(x.z));
+}
+
 // Error function: a series in x^2 below 1, exp(-x^2) times a polynomial in 1 / (1 + x / 2) above (relative error 1.3e-7).
 float lf_erf(float x) {
     float a = abs(x);
@@ -363,37 +389,40 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float edge_i = lf_edge_reflection(sin_i, i.w.z, lf_candy_interface.n, t);
     float edge_o = lf_edge_reflection(sin_o, o.w.z, lf_candy_interface.n, t);
     vec3 q = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
-    float spread = (i.spread * i.spread + o.spread * o.spread) * (lf_candy.alpha * lf_candy.alpha);
+    float spread = (pow(max(i.spread, 1e-30), 1.5) + pow(max(o.spread, 1e-30), 1.5)) * pow(max(lf_candy.alpha, 1e-30), 1.5);
+    float total = spread + 2.2795072 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    total = total + 2.0 * pow(max(lf_candy.alpha, 1e-30), 1.5);
+    float width = min(pow(max(total, 1e-30), 0.6666667), 1.5);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    float total = spread + 3.0 * (t * t);
-    total = total + 2.0 * (lf_candy.alpha * lf_candy.alpha);
-    float width = min(sqrt(max(total, 0.0)), 1.5);
-    t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    float own = t * t;
-    total = spread + 2.0 * (own + lf_candy.alpha * lf_candy.alpha);
-    float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(total, 2.25 - own);
+    float own2 = t * t;
+    total = spread + 1.279507 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    total = total + 2.0 * pow(max(lf_candy.alpha, 1e-30), 1.5);
+    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(max(t, 1e-30), 1.5)));
+    float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
     float lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
+    total = spread + 1.6817929 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    total = total + pow(max(lf_candy.alpha, 1e-30), 1.5);
+    width = min(pow(max(total, 1e-30), 0.6666667), 1.5);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    total = spread + 2.0 * (t * t);
-    total = total + lf_candy.alpha * lf_candy.alpha;
-    width = min(sqrt(max(total, 0.0)), 1.5);
-    t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    own = t * t;
-    total = spread + (own + lf_candy.alpha * lf_candy.alpha);
-    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(total, 2.25 - own);
+    own2 = t * t;
+    total = spread + 0.68179286 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    total = total + pow(max(lf_candy.alpha, 1e-30), 1.5);
+    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(max(t, 1e-30), 1.5)));
+    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
     lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes = lobe + q * lobes;
+    total = spread + pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    width = min(pow(max(total, 1e-30), 0.6666667), 1.5);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    total = spread + t * t;
-    width = min(sqrt(max(total, 0.0)), 1.5);
-    t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    own = t * t;
-    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(spread, 2.25 - own);
+    own2 = t * t;
+    total = spread + 0.0 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(max(t, 1e-30), 1.5)));
+    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
     lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);

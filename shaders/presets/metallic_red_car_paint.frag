@@ -93,6 +93,32 @@ const vec3 lf_flakes_returned = vec3(1.1321957, 1.0002629, 1.0001049);
 
 const vec3 lf_flakes_lobes = vec3(0.38999024, 0.39579824, 0.40050957);
 
+// log(1 + x) without the cancellation near 0.
+float lf_log1p(float x) {
+    if (abs(x) > 0.3) {
+        return log(1.0 + x);
+    }
+    float s = x / (2.0 + x);
+    float u = s * s;
+    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+}
+
+vec3 lf_log1p(vec3 x) {
+    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
+}
+
+// exp(x) - 1 without the cancellation near 0.
+float lf_expm1(float x) {
+    if (abs(x) > 0.4) {
+        return exp(x) - 1.0;
+    }
+    return x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
+}
+
+vec3 lf_expm1(vec3 x) {
+    return vec3(lf_expm1(x.x), lf_expm1(x.y), lf_expm1(x.z));
+}
+
 // Error function: a series in x^2 below 1, exp(-x^2) times a polynomial in 1 / (1 + x / 2) above (relative error 1.3e-7).
 float lf_erf(float x) {
     float a = abs(x);
@@ -446,38 +472,41 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     edge_i = lf_edge_reflection(sin_i, i2.w.z, lf_colour_interface.n, t);
     edge_o = lf_edge_reflection(sin_o, o2.w.z, lf_colour_interface.n, t);
     vec3 q2 = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
-    spread = (i.spread * i.spread + o.spread * o.spread) * (lf_clear_coat.alpha * lf_clear_coat.alpha);
-    spread = spread + (i2.spread * i2.spread + o2.spread * o2.spread) * (lf_colour.alpha * lf_colour.alpha);
+    spread = (pow(max(i.spread, 1e-30), 1.5) + pow(max(o.spread, 1e-30), 1.5)) * pow(max(lf_clear_coat.alpha, 1e-30), 1.5);
+    spread = spread + (pow(max(i2.spread, 1e-30), 1.5) + pow(max(o2.spread, 1e-30), 1.5)) * pow(max(lf_colour.alpha, 1e-30), 1.5);
+    total = spread + 2.2795072 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    total = total + 2.0 * pow(max(lf_colour.alpha, 1e-30), 1.5);
+    width = min(pow(max(total, 1e-30), 0.6666667), 1.5);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    total = spread + 3.0 * (t * t);
-    total = total + 2.0 * (lf_colour.alpha * lf_colour.alpha);
-    width = min(sqrt(max(total, 0.0)), 1.5);
-    t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    float own = t * t;
-    total = spread + 2.0 * (own + lf_colour.alpha * lf_colour.alpha);
-    float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(total, 2.25 - own);
+    float own2 = t * t;
+    total = spread + 1.279507 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    total = total + 2.0 * pow(max(lf_colour.alpha, 1e-30), 1.5);
+    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(max(t, 1e-30), 1.5)));
+    float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
     lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     vec3 lobes2 = lobe / max(1.0 - q2, 1e-06);
+    total = spread + 1.6817929 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    total = total + pow(max(lf_colour.alpha, 1e-30), 1.5);
+    width = min(pow(max(total, 1e-30), 0.6666667), 1.5);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    total = spread + 2.0 * (t * t);
-    total = total + lf_colour.alpha * lf_colour.alpha;
-    width = min(sqrt(max(total, 0.0)), 1.5);
-    t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    own = t * t;
-    total = spread + (own + lf_colour.alpha * lf_colour.alpha);
-    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(total, 2.25 - own);
+    own2 = t * t;
+    total = spread + 0.68179286 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    total = total + pow(max(lf_colour.alpha, 1e-30), 1.5);
+    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(max(t, 1e-30), 1.5)));
+    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
     lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes2 = lobe + q2 * lobes2;
+    total = spread + pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    width = min(pow(max(total, 1e-30), 0.6666667), 1.5);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    total = spread + t * t;
-    width = min(sqrt(max(total, 0.0)), 1.5);
-    t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
-    own = t * t;
-    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(spread, 2.25 - own);
+    own2 = t * t;
+    total = spread + 0.0 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
+    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(max(t, 1e-30), 1.5)));
+    alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
     lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);

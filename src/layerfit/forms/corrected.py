@@ -19,7 +19,7 @@ from .._chunk import chunk, safe_divide, safe_power, safe_sqrt, struct, where
 from .._types import Colour, Scalar, Vec3
 from ..layers import Coat
 from ..optics.interface import steer
-from ..optics.microfacet import Width, half_cosine, half_vector
+from ..optics.microfacet import Distribution, Width, half_cosine, half_vector
 from ..surfaces.base import Lobe
 from . import haze
 from .crossing import Crossing, Interface, cross, interface_of, mean_width
@@ -29,6 +29,9 @@ from .enclosure import haze_below, left, remains
 DIRECTIONAL_SHARE = 0.5
 # Widths add as powers: exactly 2 for Beckmann (Gaussian slopes); GGX is not closed, its peak asks for 1.26 and the walk for 1.34.
 WIDTH_POWER = {"beckmann": 2.0, "ggx": 1.34}
+MIXED_POWER = 1.5
+"""Of lobes of one kind through boundaries of the other. The peak of a Gaussian lobe of width a, spread by GGX slopes of width b, is that of
+one of width a / sqrt(e^k E2(k)), k = (b / a)^2, with E2 the exponential integral: for b <= a this power is within 2 % of it."""
 WIDEST = 1.5
 
 
@@ -145,8 +148,8 @@ class _Below:
     R_i: Colour
     """Energy that the stack above sends back down."""
     R_o: Colour
-    spreads: tuple[tuple[Width, Scalar, Scalar], ...]
-    """Facet width and spreads of the two directions, of each interface passed."""
+    spreads: tuple[tuple[Width, Scalar, Scalar, Distribution], ...]
+    """Facet width, spreads of the two directions and kind, of each interface passed."""
 
 
 def _enter(above: _Below | None, wi: Vec3, wo: Vec3, prepared: Prepared, options: Corrected) -> _Below:
@@ -181,7 +184,7 @@ def _enter(above: _Below | None, wi: Vec3, wo: Vec3, prepared: Prepared, options
         diffuse=remains(coat.extinction, straight + added),
         R_i=R_i,
         R_o=R_o,
-        spreads=(*spreads, (coat.width, i.spread, o.spread)),
+        spreads=(*spreads, (coat.width, i.spread, o.spread, coat.distribution)),
     )
 
 
@@ -214,9 +217,15 @@ def _shape(target: Lobe, wi: Vec3, wo: Vec3, h: Vec3, order: int, below: _Below,
     if spread is None:
         return target.shape(wi, wo, h, target.width)
     width = _widened(target, order, below, spread)
-    if WIDTH_POWER[target.distribution] != 2.0:
+    if target.distribution != "beckmann":
         return target.shape(wi, wo, h, width)
     return target.widened(wi, wo, h, width, _added(target, order, below, spread))
+
+
+def _width_power(target: Lobe, below: _Below) -> float:
+    """The power in which widths add to that of a lobe."""
+    kinds = {target.distribution, *(kind for *_, kind in below.spreads)}
+    return WIDTH_POWER[target.distribution] if len(kinds) == 1 else MIXED_POWER
 
 
 def _by_lobes(lobes: Colour, R: Colour, crossing: Crossing, tau: Colour | None) -> Colour:
@@ -255,40 +264,50 @@ def _component(width: Width, axis: int) -> Scalar:
 
 def _spread(target: Lobe, below: _Below) -> Width:
     """What the interfaces passed add to the width of every lobe, to the power in which widths add."""
-    p = WIDTH_POWER[target.distribution]
+    p = _width_power(target, below)
 
     def along(axis: int) -> Scalar:
         spread: Any = 0.0
-        for width, spread_i, spread_o in below.spreads:
+        for width, spread_i, spread_o, _ in below.spreads:
             spread = spread + (_power(spread_i, p) + _power(spread_o, p)) * _power(_component(width, axis), p)
         return spread
 
-    return _per_axis([target.width, *(width for width, _, _ in below.spreads)], along)
+    return _per_axis([target.width, *(width for width, *_ in below.spreads)], along)
+
+
+def _grown(target: Lobe, order: int, below: _Below, spread: Width, axis: int, more: bool = False) -> Scalar:
+    """Width, to its power, of the lobe of light that met `target` `order` times, and the interface above it in between; or what is `more`
+    than its own."""
+    p = _width_power(target, below)
+    # The lobe meets itself in the power of its own kind.
+    times = order ** (p / WIDTH_POWER[target.distribution]) - more
+    total = _component(spread, axis) + times * _power(_component(target.width, axis), p)
+    if order > 1:
+        total = total + (order - 1) * _power(_component(below.spreads[-1][0], axis), p)
+    return total
 
 
 def _widened(target: Lobe, order: int, below: _Below, spread: Width) -> Width:
-    """Width of the lobe of light that met `target` `order` times, and the interface above it in between."""
-    p = WIDTH_POWER[target.distribution]
+    """Width of that lobe."""
+    p = _width_power(target, below)
 
     def along(axis: int) -> Scalar:
-        total = _component(spread, axis) + order * _power(_component(target.width, axis), p)
-        if order > 1:
-            total = total + (order - 1) * _power(_component(below.spreads[-1][0], axis), p)
-        width = jnp.minimum(safe_sqrt(total) if p == 2.0 else safe_power(total, 1.0 / p), WIDEST)
-        return width
+        total = _grown(target, order, below, spread, axis)
+        return jnp.minimum(safe_sqrt(total) if p == 2.0 else safe_power(total, 1.0 / p), WIDEST)
 
     return _per_axis([spread], along)
 
 
 def _added(target: Lobe, order: int, below: _Below, spread: Width) -> Width:
     """What `_widened` adds to the variance of a Gaussian lobe: for those that know a small part of their own."""
+    p = _width_power(target, below)
 
     def along(axis: int) -> Scalar:
-        own = _power(_component(target.width, axis), 2.0)
-        total = _component(spread, axis)
-        if order > 1:
-            total = total + (order - 1) * (own + _power(_component(below.spreads[-1][0], axis), 2.0))
-        return jnp.minimum(total, WIDEST * WIDEST - own)
+        own = _component(target.width, axis)
+        own2 = own * own
+        more = _grown(target, order, below, spread, axis, more=True)
+        added = more if p == 2.0 else own2 * jnp.expm1(2.0 / p * jnp.log1p(more / _power(own, p)))
+        return jnp.minimum(added, WIDEST * WIDEST - own2)
 
     return _per_axis([spread], along)
 
@@ -321,7 +340,7 @@ def _scattered(prepared: Prepared, below: _Below, options: Corrected) -> Colour:
         return haze.Way(crossing.w, path, R)
 
     spread: Any = 0.0
-    for width, spread_i, spread_o in below.spreads if options.broaden else ():
+    for width, spread_i, spread_o, _ in below.spreads if options.broaden else ():
         both = safe_power(spread_i, haze.POWER) + safe_power(spread_o, haze.POWER)
         spread = spread + both * haze.width_power(width)
     i, o = way(below.i, below.R_i), way(below.o, below.R_o)
