@@ -43,6 +43,7 @@ TITANIUM: dict[str, Any] = {"eta": [2.741, 2.542, 2.267], "k": [3.814, 3.435, 3.
 WOOD = [0.5, 0.28, 0.13]
 VARNISH = lf.Coat(alpha=0.12, eta=1.5, tau=[0.08, 0.25, 0.7])
 METAL = lf.Conductor(alpha=0.25, **COPPER)
+DUST = lf.Deposit(thickness_um=20.0, K_per_mm=[20.0, 8.0, 4.0], S_per_mm=50.0, alpha=0.3)
 CRUST: dict[str, Any] = {"absorbed": [2.2, 0.28, 0.45], "scattered": 0.7}
 
 
@@ -111,6 +112,12 @@ MODELS: dict[str, Case] = {
     "overgrowth": Case(
         lf.Stack((lf.Overgrowth(years=9.0, softness=0.1, cells=4.0, K_per_mm=[20.0, 2.0, 6.0], S_per_mm=50.0),), METAL),
         ("overgrowth.years", "overgrowth.softness", "overgrowth.K_per_mm", "overgrowth.alpha", "base.alpha"),
+    ),
+    "deposit": Case(lf.Stack((DUST,), METAL), ("deposit.K_per_mm", "deposit.alpha", "deposit.eta")),
+    "erosion": Case(lf.Stack((lf.Erosion(amount_um=8.0), DUST), METAL), ("erosion.amount_um", "deposit.alpha", "deposit.eta")),
+    "polish": Case(
+        lf.Stack((lf.Polish(height_um=12.0, strength=0.4), DUST), METAL),
+        ("polish.strength", "deposit.K_per_mm", "deposit.eta"),  # strength and alpha are seen by one width
     ),
 }
 
