@@ -65,6 +65,7 @@ def interface(stack: Stack) -> Any:
 
 def begin(stack: Stack) -> None:
     """Have what `measure` needs compiled, while other work goes on."""
+    stack = jax.tree.map(np.asarray, stack)  # numbers of NumPy: a comparison is not worth a compiler's time
     if stack.layers and not unmeasured(stack):
         walk.begin(stack, interface(stack), walk.hazes(stack))
 

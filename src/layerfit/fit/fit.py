@@ -22,7 +22,7 @@ from .blocks import Block, arrange, channels_first
 from .difference import Curve, compared, curve, slope
 from .parameters import LIGHT, parametrise, with_fixed
 from .profile import Profile, along, deep, lower_limit, scatter, threshold
-from .residuals import NEAR, begin, depths, initial, rows, scaled, step
+from .residuals import NEAR, begin, begin_solver, depths, initial, rows, scaled, step
 from .result import FitResult, Held, Row
 from .solve import NormalLevenbergMarquardt
 from .starts import FINE_STEPS, LEVEL, SCREENED, Minimum, distinct, in_sight, ranked, search, space_filling
@@ -110,12 +110,13 @@ class _Fit:
 
     def run(self) -> FitResult:
         origin = self.free.pack(self.start)
+        begin_solver(origin, self.bounds, self.blocks, free=self.free, solver=self.solver)
+        if self.model_error:
+            discrepancy.begin(self.start)
         begin(origin, self.start, self.blocks, free=self.free)
         for view, samples in zip(self.views, self.samples, strict=True):
             stack = scaled(self.start, view.scales(self.start))
             render.begin(stack, samples.wi.shape[1], narrowed(samples.place, stack.needs))
-        if self.model_error:
-            discrepancy.begin(self.start)
         self._weigh(None)
         minima = self._settled(self._search())
         origin = self.free.pack(self.start)

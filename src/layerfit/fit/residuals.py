@@ -78,6 +78,12 @@ def begin(u: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisatio
     _derivatives.begin(np.asarray(u).astype(np.float32), start, blocks[0].scale, free=free)
 
 
+def begin_solver(u: Any, bounds: Any, blocks: Sequence[Block], *, free: Parametrisation, solver: Any) -> None:
+    """The same of the solver's part of it, which is traced with small things that are compiled at once: begin it before what is large."""
+    total = np.zeros((len(blocks[0].target), len(free.free) + 1, len(free.free) + 1))
+    _solver_step.begin(u, initial(u, solver), bounds, total, free=free, solver=solver)
+
+
 def _started(u: np.ndarray, start: Stack, blocks: Sequence[Block], free: Parametrisation) -> list[Any]:
     """Columns of all blocks, begun; references of one thickness share the prepared material."""
     materials: dict[bytes | None, Any] = {}
