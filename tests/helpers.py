@@ -194,6 +194,12 @@ STACKS: dict[str, Stack] = {
     "precise, anisotropic": Stack(
         (varnish(alpha=None, alpha_x=0.05, alpha_y=0.2),), Conductor(alpha=None, alpha_x=0.3, alpha_y=0.1, **COPPER), Precise()
     ),
+    "precise, two coats": Stack(
+        (varnish(), Coat(name="primer", alpha=0.25, eta=1.8, tau=[0.3, 0.1, 0.2])), Conductor(alpha=0.25, **COPPER), Precise()
+    ),
+    "precise, the inner coat rarer": Stack(
+        (varnish(eta=1.7), Coat(name="primer", alpha=0.2, eta=1.4)), Lambert(albedo=[0.5, 0.28, 0.13]), Precise("multi")
+    ),
     "precise over an anisotropic metal": Stack(
         (varnish(tau=None),), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.35, **COPPER), Precise("multi")
     ),

@@ -10,8 +10,9 @@ import pytest
 
 from helpers import COPPER, STACKS, brdf_rows, hemisphere, varnish
 from layerfit.errors import InputError
-from layerfit.forms import corrected, curves, precise, tables
-from layerfit.forms.precise import Crossing, Precise, Prepared, refuses
+from layerfit.forms import corrected, curves, one_coat, precise, tables
+from layerfit.forms.one_coat import Crossing, Prepared
+from layerfit.forms.precise import Precise, refuses
 from layerfit.layers import Coat
 from layerfit.optics.interface import facet_cosine, facet_tilt, rough_transmittance, second_facet
 from layerfit.optics.microfacet import half_cosine
@@ -76,24 +77,24 @@ def constants(const, patch):
     """The constants that the values were computed with, in place of the module's own."""
     names = {"P": "P", "CONDENSE": "cond", "RISE": "ka", "RATIO": "rs", "TAIL": "tl"}
     for name, key in names.items():
-        patch.setattr(precise, name, const[key])
-    patch.setattr(precise, "DIRECT", tuple(const[k] for k in ("dE", "cE", "eE")))
-    patch.setattr(precise, "DIRECT_PATH", tuple(const[k] for k in ("dU", "cU", "eU")))
-    for name, value in list(vars(precise).items()):
+        patch.setattr(one_coat, name, const[key])
+    patch.setattr(one_coat, "DIRECT", tuple(const[k] for k in ("dE", "cE", "eE")))
+    patch.setattr(one_coat, "DIRECT_PATH", tuple(const[k] for k in ("dU", "cU", "eU")))
+    for name, value in list(vars(one_coat).items()):
         if hasattr(value, "__wrapped__") and hasattr(value, "lower"):
-            patch.setattr(precise, name, value.__wrapped__)  # without what was traced with other constants
+            patch.setattr(one_coat, name, value.__wrapped__)  # without what was traced with other constants
 
 
 def fitted_bounces(c, i, o, R, coat, base, returned):
     """Light that met the base twice and more, as the values have it: by fitted constants `c`. The form itself sums it (`bounces`)."""
-    share = precise.base_share(i, o, base.alpha)
-    yi, yo = precise.lean(i, i, o, base.alpha), precise.lean(o, i, o, base.alpha)
-    part = precise.direct(share, *precise.DIRECT)
+    share = one_coat.base_share(i, o, base.alpha)
+    yi, yo = one_coat.lean(i, i, o, base.alpha), one_coat.lean(o, i, o, base.alpha)
+    part = one_coat.direct(share, *one_coat.DIRECT)
     A = U = 1.0
     for y, x in ((yi, i), (yo, o)):
-        A = A * curves.absorbed(precise.between(y, x, part), part * x.theta, coat.tau)
-        p = precise.direct(share, *precise.DIRECT_PATH)
-        U = U * precise.projected(precise.between(y, x, p), p * x.theta, coat.tau)
+        A = A * curves.absorbed(one_coat.between(y, x, part), part * x.theta, coat.tau)
+        p = one_coat.direct(share, *one_coat.DIRECT_PATH)
+        U = U * one_coat.projected(one_coat.between(y, x, p), p * x.theta, coat.tau)
     a, a2 = coat.alpha, base.alpha**2
     F = base.reflectance(half_cosine(yi, yo))
     wide = (2.0 * base.alpha ** c["P"] + c["ca"] * a ** c["P"]) ** (1.0 / c["P"])
@@ -101,7 +102,7 @@ def fitted_bounces(c, i, o, R, coat, base, returned):
     broad = base.alpha ** c["nb"] / (base.alpha ** c["nb"] + c["cb"])
     q = jnp.minimum(base.f0 * (1.0 - c["l"] * a2 / (1.0 + a2)) * returned * (1.0 + c["q1"] * a), 0.97)
     scattered = (1.0 + c["sa"] * a) * (1.0 - h) * ((1.0 - broad) * c["sp"] * R * A + broad * c["gl"] * returned)
-    lobe = scattered * U * precise.lobe(i, o, yi, yo, wide, base.alpha)
+    lobe = scattered * U * one_coat.lobe(i, o, yi, yo, wide, base.alpha)
     return i.T * o.T / coat.eta**2 * F * F * A * (lobe + h * c["g"] * returned / jnp.pi) / (1.0 - q)
 
 
@@ -118,7 +119,7 @@ def test_values_with_linear_tables_are_those_of_the_oracle(oracle, monkeypatch):
         base = as_array(base).below(coat.eta)
         i, o = interface.cross(case["wi"]), interface.cross(case["wo"])
         returned = jnp.asarray(interface.returned(c["tau"]))
-        value = precise.below(i, o, Prepared(coat, None, base, returned, None, None))
+        value = one_coat.below(i, o, Prepared(coat, None, base, returned, None, None))
         if b["kind"] == "conductor":
             R = 0.5 * (interface.back(case["wi"]) + interface.back(case["wo"]))
             value = value + fitted_bounces(data["const"], i, o, R, coat, base, returned)
@@ -148,9 +149,9 @@ def errors(oracle, interface, kind):
 
     def row(stack, wi, wo):
         p = stack.prepare()
-        i = precise.pass_interface(p.interface, p.coat.eta, p.coat.alpha, wi)
-        cross = lambda w: precise.pass_interface(p.interface, p.coat.eta, p.coat.alpha, w)  # noqa: E731
-        return jax.vmap(lambda w: precise.below(i, cross(w), p))(wo)
+        i = one_coat.pass_interface(p.interface, p.coat.eta, p.coat.alpha, wi)
+        cross = lambda w: one_coat.pass_interface(p.interface, p.coat.eta, p.coat.alpha, w)  # noqa: E731
+        return jax.vmap(lambda w: one_coat.below(i, cross(w), p))(wo)
 
     wo, truth = column(lambda r: r["wos"]), np.asarray(column(lambda r: r["f_sub"]))
     f = np.asarray(jax.jit(jax.vmap(row))(stack, column(lambda r: r["wi"]), wo))
@@ -246,7 +247,7 @@ def test_the_baked_curves_are_the_tables(interface):
             baked, _ = curves.bake(eta, alpha, interface)
             mu = t.mu.astype(float)
             w = jnp.stack([jnp.sqrt(1.0 - mu**2), 0.0 * mu, mu], -1)
-            found = jax.vmap(lambda w, baked=baked, eta=eta, alpha=alpha: precise.pass_interface(baked, eta, alpha, w))(w)
+            found = jax.vmap(lambda w, baked=baked, eta=eta, alpha=alpha: one_coat.pass_interface(baked, eta, alpha, w))(w)
             closed = jax.vmap(
                 lambda w, eta=eta, alpha=alpha: rough_transmittance(
                     facet_cosine(w, facet_tilt(alpha)), eta, second_facet(alpha)
@@ -298,13 +299,64 @@ def test_a_coat_that_is_not_there_changes_nothing(interface, base):
         np.testing.assert_allclose(brdf_rows(coated, wi, wo), bare, rtol=2e-5)
 
 
+@pytest.mark.parametrize("base", [Conductor(alpha=0.3, **COPPER), Lambert(albedo=0.7)], ids=lambda b: type(b).__name__)
+@pytest.mark.parametrize(("absent", "tolerance"), [("outer", 2e-3), ("inner", 5e-4)])
+def test_of_two_coats_one_that_is_not_there_changes_nothing(absent, tolerance, base):
+    """No step of the index at its top and no absorption: the other coat alone, but for energies between their nodes and the bound of paths."""
+    wi, wo = hemisphere(256, 3), hemisphere(256, 4)
+    coat = varnish(alpha=0.15, eta=1.6, tau=None)
+    one = brdf_rows(Stack((coat,), base, Precise("multi")).astype(np.float64), wi, wo)
+    gone = Coat(name="gone", alpha=0.4, eta=1.0 if absent == "outer" else 1.6)
+    layers = (gone, coat) if absent == "outer" else (coat, gone)
+    two = brdf_rows(Stack(layers, base, Precise("multi")).astype(np.float64), wi, wo)
+    np.testing.assert_allclose(two, one, rtol=tolerance)
+
+
+def walked_two():
+    """Two coats at random over metals, the inner one denser or rarer; directions, and light from below their top by the walk."""
+    rng = np.random.default_rng(9)
+    count, views = 30, 6
+    number = lambda low, high: rng.uniform(low, high, count).repeat(views)  # noqa: E731
+    coats = tuple(
+        Coat(name=name, alpha=number(0.05, 0.4), eta=number(1.3, 2.0), tau=number(0.0, 1.0), masking="smith_separable")
+        for name in ("coat", "primer")
+    )
+    base = Conductor(alpha=number(0.1, 0.6), eta=number(0.2, 1.5), k=number(2.0, 5.0))
+    wi, wo = (hemisphere(count * views, seed) for seed in (5, 6))
+    wi = wi[::views].repeat(views, 0)
+    f = walk_rows(Stack(coats, base), wi, wo, paths=3000, seed=1).mean.mean(-1)
+    return coats, base, wi, wo, f.reshape(count, views)
+
+
+def test_two_coats_are_near_to_the_walk():
+    coats, base, wi, wo, f = walked_two()
+    mu = wo[:, 2].reshape(f.shape)
+
+    def error(form, options):
+        def one(coats, base, wi, wo):
+            return form.evaluate(form.prepare(coats, base, options), wi, wo, options) - coats[0].evaluate(wi, wo)
+
+        found = np.asarray(jax.jit(jax.vmap(one))(coats, base, wi, wo)).reshape(f.shape)
+        return np.sum(np.abs(found - f) * mu, 1) / np.sum(f * mu, 1)
+
+    near, plain = error(precise, Precise()), error(corrected, corrected.Corrected())
+    assert np.median(near) <= 0.06
+    for q in (0.5, 0.9):
+        assert np.quantile(near, q) < 0.7 * np.quantile(plain, q)
+
+
 def test_it_refuses_what_it_is_not_for():
     coat, metal = Coat(), Conductor(alpha=0.2, **COPPER)
     assert refuses((coat,), metal) is None
     assert refuses((coat,), OrenNayar()) is None
+    assert refuses((coat, coat), metal) is None
     for layers, base in [
         ((), metal),
-        ((coat, coat), metal),
+        ((coat, coat, coat), metal),
+        ((coat, Coat(name="primer", alpha=None, alpha_x=0.1, alpha_y=0.2)), metal),
+        ((coat, Coat(name="primer", distribution="beckmann")), metal),
+        ((coat, Coat(name="primer", tau_s=0.5)), metal),
+        ((coat, coat), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.2, **COPPER)),
         ((coat,), Conductor(alpha=0.2, distribution="beckmann", **COPPER)),
         ((coat,), Dielectric(alpha=0.2, eta=1.5)),
     ]:

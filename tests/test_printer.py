@@ -235,7 +235,13 @@ def test_uniforms_and_constants_draw_the_same(gl, name):
     np.testing.assert_allclose(uniforms, constants, rtol=2e-5, atol=1e-6)
 
 
-FORMS = ("corrected over conductor", "corrected over lambert", "corrected, three layers", "faithful over conductor")
+FORMS = (
+    "corrected over conductor",
+    "corrected over lambert",
+    "corrected, three layers",
+    "faithful over conductor",
+    "precise, two coats",
+)
 GOLDEN_STACKS = {name: STACKS[name] for name in FORMS} | manual.EXAMPLES
 """What no preset shows: the shaders of those lie beside them."""
 

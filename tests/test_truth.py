@@ -89,7 +89,10 @@ def test_which_forms_are_compared(interface):
     assert list(forms_of(COPPER, interface)) == ["precise", "corrected", "faithful"]
     assert forms_of(COPPER, interface)["precise"] == Precise(interface)
     two = Stack((Coat(name="top"), Coat(name="primer", eta=1.8)), Lambert(), Corrected(orders=1))
-    assert forms_of(two, interface) == {"corrected": Corrected(orders=1), "faithful": Faithful()}
+    others = {"corrected": Corrected(orders=1), "faithful": Faithful()}
+    assert forms_of(two, interface) == {"precise": Precise(interface)} | others
+    three = dataclasses.replace(two, layers=(*two.layers, Coat(name="filler")))
+    assert forms_of(three, interface) == others
 
 
 @pytest.mark.parametrize("form", [Precise("multi"), Precise("single"), Corrected()])

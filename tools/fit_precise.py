@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
-from layerfit.forms import bounces, corrected, curves, precise
+from layerfit.forms import bounces, corrected, curves, one_coat, precise, two_coats
 from layerfit.layers import Coat
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Lambert
@@ -115,7 +115,9 @@ def form(row: dict[str, Any], interface: str, kind: str, facets: str = "ggx", mo
         def pair(wo: Any) -> Any:
             if model == "corrected":
                 return corrected.evaluate(p, wi, wo, options) - coats[0].evaluate(wi, wo)
-            return precise.below(precise.cross(p, wi), precise.cross(p, wo), p)
+            if len(coats) == 2:
+                return two_coats.below(p, wi, wo)
+            return one_coat.below(one_coat.cross(p, wi), one_coat.cross(p, wo), p)
 
         return jax.vmap(pair)(wo)
 
@@ -141,6 +143,9 @@ def check(paths: list[Path], model: str) -> None:
             parts = {"all": errors}
             if "base_alpha" in row:
                 parts["narrow bases"] = errors[row["base_alpha"] < NARROW]
+            if "primer_eta" in row:
+                denser = row["primer_eta"] >= row["coat_eta"]
+                parts |= {"denser below": errors[denser], "rarer below": errors[~denser]}
             for name, values in parts.items():
                 p50, p90 = np.quantile(values, [0.5, 0.9])
                 print(
@@ -149,14 +154,14 @@ def check(paths: list[Path], model: str) -> None:
 
 
 CONSTANTS = {
-    "P": (curves, precise, bounces),
+    "P": (curves, one_coat, two_coats, bounces),
     "WIDTH": (curves,),
     "STEER": (curves,),
     "AGAIN": (bounces,),
-    "CONDENSE": (precise,),
-    "RISE": (precise,),
-    "RATIO": (precise,),
-    "TAIL": (precise,),
+    "CONDENSE": (one_coat,),
+    "RISE": (one_coat,),
+    "RATIO": (one_coat,),
+    "TAIL": (one_coat,),
 }
 """By name, with the modules that read them."""
 
@@ -164,8 +169,8 @@ CONSTANTS = {
 def fit(paths: list[Path]) -> None:
     """Levenberg-Marquardt on a smooth form of the error, constants scaled by their present values."""
     start = {name: getattr(modules[0], name) for name, modules in CONSTANTS.items()}
-    start |= {f"DIRECT{k}": v for k, v in enumerate(precise.DIRECT)} | {
-        f"DIRECT_PATH{k}": v for k, v in enumerate(precise.DIRECT_PATH)
+    start |= {f"DIRECT{k}": v for k, v in enumerate(one_coat.DIRECT)} | {
+        f"DIRECT_PATH{k}": v for k, v in enumerate(one_coat.DIRECT_PATH)
     }
     names, origin = list(start), np.array(list(start.values()))
     _loosen()
@@ -200,7 +205,7 @@ def fit(paths: list[Path]) -> None:
 
 def _loosen() -> None:
     """Let constants be traced: functions without their caches, powers with any exponent."""
-    for module in (precise, bounces, curves):
+    for module in (one_coat, two_coats, bounces, curves):
         for name, value in vars(module).items():
             if hasattr(value, "__wrapped__") and hasattr(value, "lower"):
                 setattr(module, name, value.__wrapped__)
@@ -212,7 +217,7 @@ def _set(values: dict[str, Any]) -> None:
         for module in modules:
             setattr(module, name, values[name])
     for name in ("DIRECT", "DIRECT_PATH"):
-        setattr(precise, name, tuple(values[f"{name}{k}"] for k in range(3)))
+        setattr(one_coat, name, tuple(values[f"{name}{k}"] for k in range(3)))
 
 
 def main() -> None:

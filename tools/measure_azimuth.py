@@ -13,7 +13,7 @@ import itertools
 import jax
 import numpy as np
 
-from layerfit.forms import precise
+from layerfit.forms import one_coat, precise
 from layerfit.layers import Coat
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor
@@ -67,7 +67,7 @@ def below(interface: precise.Kind):
 
     def one(coat, base, wi, wo):
         p = precise.prepare((coat,), base, options)
-        return precise.below(precise.cross(p, wi), precise.cross(p, wo), p)
+        return one_coat.below(one_coat.cross(p, wi), one_coat.cross(p, wo), p)
 
     as_rows = jax.jit(jax.vmap(one))
     return lambda *arguments: as_rows(*jax.tree.map(lambda x: np.asarray(x, np.float32), arguments))

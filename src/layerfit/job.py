@@ -175,7 +175,7 @@ def _why(stack: Stack) -> str:
     reason = refuses(stack.layers, stack.base)
     if reason:
         return f"the precise form is not for this material: {reason}"
-    nearest = "the form nearest to the random walk for one coat"
+    nearest = f"the form nearest to the random walk for {'one coat' if len(stack.layers) == 1 else 'two coats'}"
     return nearest if isinstance(stack.form, Precise) else f"asked for; precise is {nearest}"
 
 

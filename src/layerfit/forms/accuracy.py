@@ -30,8 +30,16 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("precise", "multi", "beckmann, anisotropic, conductor"): (0.040, 0.155),
     ("precise", "multi", "anisotropic, diffuse"): (0.005, 0.021),
     ("precise", "multi", "anisotropic, conductor"): (0.037, 0.104),
+    ("precise", "single", "two coats, denser below, diffuse"): (0.008, 0.093),
+    ("precise", "single", "two coats, denser below, conductor"): (0.024, 0.096),
+    ("precise", "single", "two coats, rarer below, diffuse"): (0.043, 0.304),
+    ("precise", "single", "two coats, rarer below, conductor"): (0.052, 0.422),
+    ("precise", "multi", "two coats, denser below, diffuse"): (0.022, 0.090),
+    ("precise", "multi", "two coats, denser below, conductor"): (0.023, 0.075),
+    ("precise", "multi", "two coats, rarer below, diffuse"): (0.027, 0.515),
+    ("precise", "multi", "two coats, rarer below, conductor"): (0.048, 0.662),
 }
-"""(form, interface, base, with the facets of the coat where they are not GGX, and anisotropy): median and 90th percentile over materials."""
+"""(form, interface, base, with what is more than one isotropic GGX coat): median and 90th percentile over materials."""
 
 
 def against_walk(layers: tuple[Any, ...], base: Any, form: Any) -> dict[str, Any] | None:
@@ -40,7 +48,7 @@ def against_walk(layers: tuple[Any, ...], base: Any, form: Any) -> dict[str, Any
         return None
     name = "precise" if isinstance(form, precise.Precise) else "corrected"
     interface = getattr(form, "interface", "single")
-    kind = _kind(layers[0], base)
+    kind = _kind(layers[0], base) if len(layers) == 1 else _kind_of_two(layers[0], layers[1], base)
     if (name, interface, kind) not in MEASURED:
         return None
     p50, p90 = MEASURED[name, interface, kind]
@@ -54,3 +62,8 @@ def _kind(coat: Any, base: Any) -> str:
     elif kind == "conductor" and base.alpha < NARROW and coat.distribution == "ggx":
         kind = "narrow"
     return kind if coat.distribution == "ggx" else f"{coat.distribution}, {kind}"
+
+
+def _kind_of_two(outer: Any, inner: Any, base: Any) -> str:
+    order = "denser" if inner.eta >= outer.eta else "rarer"
+    return f"two coats, {order} below, {'conductor' if isinstance(base, Conductor) else 'diffuse'}"

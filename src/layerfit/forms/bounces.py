@@ -56,7 +56,7 @@ def wider(alpha: Scalar, coat_alpha: Scalar) -> Scalar:
     return safe_power(2.0 * safe_power(alpha, P) + AGAIN * safe_power(coat_alpha, P), 1.0 / P)
 
 
-def bounces(nodes: Nodes, alpha: Scalar, coat: Coat, base: Conductor) -> tuple[Curve, Curve]:
+def bounces(nodes: Nodes, alpha: Scalar, coat: Coat, base: Conductor | Coat) -> tuple[Curve, Curve]:
     """Weight of a wider lobe, and fourth root of the rest, over the cosine above; for each colour.
 
     `alpha` is the width of the coat's GGX facets; `coat` and `base` have relative indices.
@@ -67,11 +67,11 @@ def bounces(nodes: Nodes, alpha: Scalar, coat: Coat, base: Conductor) -> tuple[C
     return jax.vmap(lambda base, tau: _bounces(nodes, alpha, coat.eta, base, tau), in_axes=colours)(base, coat.tau)
 
 
-def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor, tau: Scalar | None) -> tuple[Curve, Curve]:
+def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, tau: Scalar | None) -> tuple[Curve, Curve]:
     # Facets that are met once lose light. Out of diffuse light comes what comes in, over eta^2: of 1 - R that part, the rest is lost.
     passes = hemispherical(nodes.T) / (eta * eta * (1.0 - diffuse_return(nodes, None)))
     edge = safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta
-    cells = _cells(edge)
+    cells = cells_of(edge)
     aside = 0.5 * nodes.spread / nodes.z
     first = _added(base.alpha, aside)
     wide = _added(wider(base.alpha, alpha), aside)
@@ -116,7 +116,7 @@ def _added(alpha: Scalar, aside: Float[Array, " m"]) -> Float[Array, " m"]:
     return safe_power(safe_power(alpha, P) + safe_power(aside, P), 1.0 / P)
 
 
-def _cells(edge: Scalar) -> Float[Array, " k"]:
+def cells_of(edge: Scalar) -> Float[Array, " k"]:
     """Cosines from 0 to the edge of total reflection and from there to 1, even in each."""
     k = np.arange(2 * CELLS + 1) / CELLS
     outside = jnp.asarray(np.minimum(k, 1.0), edge.dtype)

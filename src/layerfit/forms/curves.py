@@ -129,10 +129,7 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     tilt, gain = facet_tilt(rough), second_facet(rough)
     closed = jax.vmap(lambda c: rough_transmittance(c, eta, gain))(jnp.sqrt(mu * mu + tilt * sin2))
     T = clip(closed + rows[0], 0.0, 1.0)
-    x, dx = (jnp.asarray(a, dtype) for a in _gauss())
-    edge = safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta
-    cosines = jnp.concatenate([edge * x, edge + (1.0 - edge) * x])
-    widths = jnp.concatenate([edge * dx, (1.0 - edge) * dx])
+    cosines, widths = gauss(safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta)
     weights = 2.0 * (jnp.asarray(baked.quadrature, dtype) @ R) * cosines * widths
     nodes = Nodes(
         z,
@@ -154,6 +151,12 @@ def diffuse_return(nodes: Nodes, tau: Colour | None) -> Colour:
         kept = 1.0 if tau is None else jnp.exp(-(2.0 * tau) * safe_divide(1.0, jnp.asarray(nodes.cosines[k])))
         total = total + nodes.weights[k] * kept
     return jnp.asarray(total)
+
+
+def gauss(edge: Scalar) -> tuple[Float[Array, " q"], Float[Array, " q"]]:
+    """Cosines and weights of the quadrature of light from below: inside and outside of the edge of total reflection."""
+    x, dx = (jnp.asarray(a, edge.dtype) for a in _gauss())
+    return jnp.concatenate([edge * x, edge + (1.0 - edge) * x]), jnp.concatenate([edge * dx, (1.0 - edge) * dx])
 
 
 def hemispherical(values: Float[Array, " m"]) -> Scalar:

@@ -16,7 +16,7 @@ from .._fields import params
 from .._place import TANGENT, Place, needs_tangent
 from ..errors import InputError
 from ..forms import weathering
-from ..forms.precise import BAKED, HELD, Precise
+from ..forms.precise import BAKED, Precise, held
 from ..optics.lazanyi import fit_lazanyi
 from ..preset import left_out, model_name
 from ..stack import PREPARED, Stack, at, evaluate, prepared
@@ -112,13 +112,13 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
         declarations = "".join(f"uniform {kind} {name};  // {note}\n" for _, name, kind, note in given)
         values = {name: np.asarray(leaf) for leaf, name, _, _ in given}
         structure = jax.tree.structure(stack)
-        held = _held(stack)
+        constants = _held(stack)
 
         def local(*args: Any) -> Any:
             free = iter(args[: -len(inputs)])
             values = [next(free) if row else leaf for row, leaf in zip(rows, leaves, strict=True)]
             live: Stack = jax.tree.unflatten(structure, values)
-            return shade(dataclasses.replace(live.prepare(), **held), *args[-len(inputs) :])
+            return shade(dataclasses.replace(live.prepare(), **constants), *args[-len(inputs) :])
 
         outside = [(leaf, name) for leaf, name, _, _ in given]
     else:
@@ -186,20 +186,19 @@ def _held(stack: Stack) -> dict[str, Any]:
     if not isinstance(stack.form, Precise) or not stack.layers:
         return {}
     with jax.enable_x64(False):
-        made = prepared(stack)
-    return {name: jax.tree.map(np.asarray, getattr(made, name)) for name in HELD}
+        return jax.tree.map(np.asarray, held(prepared(stack)))
 
 
 def _uniforms(stack: Stack) -> list[tuple[Any, str, str, str] | None]:
     """Every number of the material as (value, uniform, type, comment), in the order of its leaves; None for what is baked."""
     rows: list[tuple[Any, str, str, str] | None] = []
-    baked = stack.layers[0] if isinstance(stack.form, Precise) else None
+    baked = stack.layers if isinstance(stack.form, Precise) else ()
     for layer in (*stack.layers, stack.base):
         for field, spec in params(layer):
             value = getattr(layer, field)
             if value is None:
                 continue
-            if layer is baked and field in BAKED:
+            if field in BAKED and any(layer is coat for coat in baked):
                 rows.append(None)
             else:
                 note = f"{spec.doc}, {spec.lower:g} to {spec.upper:g} {'' if spec.unit == '1' else spec.unit}".rstrip()

@@ -1,0 +1,512 @@
+#version 330 core
+// precise, two coats: Coat over Coat over Conductor.
+// Printed by layerfit 0.1.0 from its precise form.
+// Left out, because this material does without: coat: anisotropy, primer: anisotropy, base: anisotropy.
+// Indices of refraction are relative to the layer above: its own index divides those in the preset.
+//
+// vec3 lf_brdf(vec3 n, vec3 v, vec3 l) is the BRDF [1/sr] of unit directions that point away from the surface: v to the viewer, l to
+// the light. It holds no cosine and no light, is one-sided (0 below the surface), and is linear Rec.709.
+// Define LF_LIBRARY to take the functions without the entry point below.
+
+struct Coat {
+    float alpha;  // width of the facet slopes; the square of an artist's roughness
+    float eta;    // index of refraction, against air
+    vec3 tau;     // optical depth, one way at normal incidence
+};
+
+struct Interface {
+    float tilt;        // turn of the mean facet towards a grazing direction
+    float gain;        // part of the reflected light that a second facet lets in
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec4 passed_high;  // the other four, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface
+    vec4 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it
+    vec4 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec4 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec4 theta_high;   // 
+};
+
+struct Curve {
+    vec3 c0;  // coefficients of the powers of the curves' argument
+    vec3 c1;  // 
+    vec3 c2;  // 
+    vec3 c3;  // 
+    vec3 c4;  // 
+    vec3 c5;  // 
+    vec3 c6;  // 
+    vec3 c7;  // 
+};
+
+struct Conductor {
+    float alpha;  // width of the facet slopes; the square of an artist's roughness
+    vec3 eta;     // index of refraction, real part
+    vec3 k;       // index of refraction, imaginary part
+};
+
+struct Crossing {
+    vec3 w;       // median direction
+    float T;      // energy that passes
+    float a;      // spread, as a width
+    float path;   // mean path, in thicknesses
+    float theta;  // scale of the path's distribution
+    float s;      // argument of the baked curves
+};
+
+const Coat lf_coat = Coat(
+    0.1,                   // alpha: width of the facet slopes; the square of an artist's roughness
+    1.5,                   // eta: index of refraction, against air
+    vec3(0.05, 0.2, 0.6)   // tau: optical depth, one way at normal incidence
+);
+
+const Coat lf_primer = Coat(
+    0.25,                 // alpha: width of the facet slopes; the square of an artist's roughness
+    1.1999999,            // eta: index of refraction, against air
+    vec3(0.3, 0.1, 0.2)   // tau: optical depth, one way at normal incidence
+);
+
+const Interface lf_coat_top = Interface(
+    0.024779007,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.022298388, 0.03387798, -0.0103099225, -0.013259102),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(0.028962415, -0.021387354, -0.01196556, 0.014177172),    // passed_high: the other four, of higher powers
+    vec4(1.0287149, -0.05618003, 0.06226027, -0.05720377),        // bend: sine of the refracted light over that at a smooth interface
+    vec4(0.041371346, 0.003288269, -0.03387451, 0.016711235),     // bend_high: 
+    vec4(0.6110438, -0.30916816, 0.19031203, -0.31476402),        // spread: width of a lobe seen through it
+    vec4(0.14646864, 0.20258307, -0.14906263, -0.01018548),       // spread_high: 
+    vec4(1.0417676, -0.09941718, 0.13050556, -0.13190842),        // path: mean path over that of the refracted direction
+    vec4(0.031531334, 0.08964729, -0.051778316, -0.007760048),    // path_high: 
+    vec4(0.08719435, -0.22555345, 0.33561954, -0.21172841),       // theta: scale of the path's distribution
+    vec4(-0.014265373, -0.082942754, -0.03109099, 0.18081078)     // theta_high: 
+);
+
+const Interface lf_coat_both = Interface(
+    0.024779007,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.022298388, 0.03387798, -0.0103099225, -0.013259102),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(0.028962415, -0.021387354, -0.01196556, 0.014177172),    // passed_high: the other four, of higher powers
+    vec4(0.8740273, -0.052167535, 0.051979005, -0.050500393),     // bend: sine of the refracted light over that at a smooth interface
+    vec4(0.038603067, 0.0008864403, -0.03025961, 0.015664577),    // bend_high: 
+    vec4(0.086013876, -0.025296414, 0.011873156, -0.024669573),   // spread: width of a lobe seen through it
+    vec4(0.013517275, 0.012449145, -0.012207508, 0.0010764301),   // spread_high: 
+    vec4(1.0279282, -0.04499501, 0.050734043, -0.05081272),       // path: mean path over that of the refracted direction
+    vec4(-0.010020733, 0.063492775, -0.01108861, -0.020301819),   // path_high: 
+    vec4(0.029751567, -0.06626405, 0.10902059, -0.075112574),     // theta: scale of the path's distribution
+    vec4(-0.06363683, 0.06794539, 0.014837317, 0.0053197443)      // theta_high: 
+);
+
+const Curve lf_coat_passed = Curve(
+    vec3(0.98590416, 0.98274827, 0.9786481),            // c0: coefficients of the powers of the curves' argument
+    vec3(-0.008990884, -0.0015497804, 0.0073432326),    // c1: 
+    vec3(0.004595518, 0.002224803, 0.0007725954),       // c2: 
+    vec3(0.019406796, 0.015256643, 0.008445501),        // c3: 
+    vec3(0.0017952919, -0.0030946732, -0.006724596),    // c4: 
+    vec3(-0.017215729, -0.008620262, -0.00020122528),   // c5: 
+    vec3(-0.0032732487, -0.00020003319, 0.0024578571),  // c6: 
+    vec3(0.006939411, 0.00228405, -0.0018701553)        // c7: 
+);
+
+const Curve lf_coat_inner_again = Curve(
+    vec3(0.36035562, 0.18331629, 0.048033655),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.13232297, -0.045524463, -0.0070955595),    // c1: 
+    vec3(-0.03457597, -0.023965664, -0.005745342),     // c2: 
+    vec3(-0.18139303, -0.069289744, -0.018667936),     // c3: 
+    vec3(0.028493881, 0.014148861, 0.0033290833),      // c4: 
+    vec3(0.2888323, 0.07907915, 0.02642098),           // c5: 
+    vec3(-0.008798778, -0.0046218336, -0.0032977536),  // c6: 
+    vec3(-0.14820898, -0.03875351, -0.014876351)       // c7: 
+);
+
+const Curve lf_coat_inner_rest = Curve(
+    vec3(0.087790474, 0.070425734, 0.04592478),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.028355302, -0.019224847, -0.010248084),     // c1: 
+    vec3(-0.01188872, -0.008520454, -0.0059707426),     // c2: 
+    vec3(-0.022531971, -0.013222992, -0.010099478),     // c3: 
+    vec3(0.016208231, 0.0052274317, 0.0011858419),      // c4: 
+    vec3(0.021609634, 0.0026577413, 0.0067653954),      // c5: 
+    vec3(-0.006114334, -0.00038325787, 0.00042888522),  // c6: 
+    vec3(-0.006678909, 0.0027752668, -0.0015666634)     // c7: 
+);
+
+const Conductor lf_base = Conductor(
+    0.25,                                     // alpha: width of the facet slopes; the square of an artist's roughness
+    vec3(0.11166667, 0.5133334, 0.61222225),  // eta: index of refraction, real part
+    vec3(2.173889, 1.3627778, 1.19)           // k: index of refraction, imaginary part
+);
+
+const Curve lf_coat_again = Curve(
+    vec3(0.10702272, 0.18307611, 0.08630122),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.007968107, -0.020511258, -0.012195066),     // c1: 
+    vec3(0.00070619583, -0.0061039925, -0.0032449812),  // c2: 
+    vec3(0.0043969452, 0.012474567, -0.0023377836),     // c3: 
+    vec3(-0.02767554, -0.023697317, -0.010627717),      // c4: 
+    vec3(-0.045617223, -0.08103442, -0.021731138),      // c5: 
+    vec3(0.017712027, 0.01457119, 0.006314054),         // c6: 
+    vec3(0.0342077, 0.056612253, 0.01638478)            // c7: 
+);
+
+const Curve lf_coat_rest = Curve(
+    vec3(0.47436744, 0.36414495, 0.23059383),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.030093089, -0.03195575, -0.029816873),     // c1: 
+    vec3(-0.0108266175, -0.004944116, -0.0026970357),  // c2: 
+    vec3(0.13356602, 0.055027127, 0.006747186),        // c3: 
+    vec3(-0.024069905, -0.032444, -0.02182895),        // c4: 
+    vec3(-0.36673546, -0.1890316, -0.053887486),       // c5: 
+    vec3(0.0031454563, 0.023649573, 0.013656676),      // c6: 
+    vec3(0.21675253, 0.123619914, 0.036097288)         // c7: 
+);
+
+// log(1 + x) without the cancellation near 0.
+float lf_log1p(float x) {
+    if (abs(x) > 0.3) {
+        return log(1.0 + x);
+    }
+    float s = x / (2.0 + x);
+    float u = s * s;
+    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+}
+
+vec3 lf_log1p(vec3 x) {
+    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
+}
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+}
+
+// Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
+float lf_fresnel_dielectric(float c, float eta) {
+    float delta = (eta - 1.0) * (eta + 1.0);
+    float g2 = delta + c * c;
+    bool refracts = g2 > 1e-08;
+    float g = sqrt(refracts ? g2 : 1.0);
+    float eta2 = eta * eta;
+    float perpendicular = (c + g) * (c + g);
+    float parallel = (eta2 * c + g) * (eta2 * c + g);
+    float rs = -delta / perpendicular;
+    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float reflectance = 0.5 * (rs * rs + rp * rp);
+    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec3 lf_half_vector(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return s / sqrt(max(dot(s, s), 1e-20));
+}
+
+// GGX density of facet normals (Walter et al. 2007, eq. 33).
+float lf_ggx_d(vec3 h, float alpha) {
+    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
+    float root = 1.0 / (e * alpha);
+    return root * root / 3.1415927;
+}
+
+// NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
+float lf_ggx_projection(vec3 w, float alpha) {
+    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
+// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+float lf_grazing(float NoW) {
+    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+}
+
+// Cosine between a direction and the facets that it meets.
+float lf_facet_cosine(vec3 w, float tilt) {
+    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+}
+
+// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
+float lf_transmittance_dielectric(float c, float eta) {
+    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float eta2 = eta * eta;
+    float perpendicular = c + g;
+    float parallel = eta2 * c + g;
+    float product = 2.0 * c * g;
+    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
+    return eta == 1.0 ? 1.0 : passed;
+}
+
+// Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
+float lf_with_second_facet(float T, float gain) {
+    return T + (1.0 - T) * gain;
+}
+
+// A polynomial of eight coefficients at s.
+float lf_curve(vec4 low, vec4 high, float s) {
+    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+}
+
+// Follow one direction through the coat's rough top.
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w) {
+    float s = lf_grazing(w.z);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
+    T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
+    T = min(T, 1.0);
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
+    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    bend = min(bend, 0.9998 / max(sine, 1e-06));
+    sine = sine * bend;
+    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
+    float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+}
+
+// 0 where the indices match and there is no interface, 1 from the first index of the tables on.
+float lf_presence(float eta) {
+    float t = max((eta - 1.0) / 0.15, 0.0);
+    t = min(t, 1.0);
+    return t * (2.0 - t);
+}
+
+// The polynomial at s; an energy is never below 0.
+vec3 lf_amount(Curve curve, float s) {
+    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
+    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+}
+
+// Part of a lobe's width, as a power, that is due to the base.
+float lf_base_share(Crossing i, Crossing o, float alpha) {
+    float base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), 1.412);
+    return base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
+}
+
+// Part of the path's spread that counts, by the base's share of the width.
+float lf_direct(float share, float d, float c, float e) {
+    return min(max(d + c * pow(max(share, 1e-30), e), 0.0), 1.5);
+}
+
+// The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
+vec3 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
+    float own = pow(max(x.a, 1e-30), 1.412);
+    float total = pow(max(alpha * (i.w.z + o.w.z), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
+    float turn = 0.7504 * own / total;
+    float y0 = x.w.x - turn * (i.w.x + o.w.x);
+    float y1 = x.w.y - turn * (i.w.y + o.w.y);
+    float sine = sqrt(max(y0 * y0 + y1 * y1, 0.0));
+    float held = min(1.0, 0.9998 / max(sine, 1e-06));
+    sine = min(sine, 0.9998);
+    return vec3(y0 * held, y1 * held, sqrt(max((1.0 - sine) * (1.0 + sine), 0.0)));
+}
+
+// A direction below a smooth boundary, as it is above it; `eta` is the index below over that above.
+vec3 lf_upwards(vec3 w, float eta) {
+    float x = eta * w.x;
+    float y = eta * w.y;
+    float sine = sqrt(max(x * x + y * y, 0.0));
+    float held = min(1.0, 0.9998 / max(sine, 1e-06));
+    sine = min(sine, 0.9998);
+    return vec3(x * held, y * held, sqrt(max((1.0 - sine) * (1.0 + sine), 0.0)));
+}
+
+// Mean path of light that the base sends on: between that of one direction and that of all that cross.
+float lf_between(vec3 y, Crossing x, float part) {
+    float straight = 1.0 / y.z;
+    return straight + part * (x.path - straight);
+}
+
+// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
+vec3 lf_absorbed(float path, float theta, vec3 tau) {
+    float scale = max(theta, 1e-06);
+    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
+}
+
+// Mean of u among the paths that are left: sum of u exp(-tau u) over that of exp(-tau u).
+vec3 lf_projected(float path, float theta, vec3 tau) {
+    return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
+}
+
+// Lambda of the GGX distribution (Heitz 2014, eq. 72).
+float lf_smith_lambda(vec3 w, float alpha) {
+    float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
+    float x = alpha * alpha * tan2;
+    return 0.5 * x / (1.0 + sqrt(1.0 + x));
+}
+
+// D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
+float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, float alpha, float masked) {
+    float M = yi.z + yo.z;
+    float M2 = M * M;
+    float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
+    float width2 = pow(max(pow(max(alpha * M, 1e-30), 1.412) + spread, 1e-30), 1.4164306);
+    float own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
+    float r = max(1.0 + 0.3271 * (width2 / own2 - 1.0), 0.6);
+    r = min(r, 4.0);
+    float log_r = log(r);
+    float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
+    float X0 = i.w.x + o.w.x;
+    float X1 = i.w.y + o.w.y;
+    float v = (X0 * X0 + X1 * X1) / width2;
+    float Y0 = yi.x + yo.x;
+    float Y1 = yi.y + yo.y;
+    float tilt = 1.0 + (Y0 * Y0 + Y1 * Y1) / M2;
+    float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
+    return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * width2 * (1.0 + v * (b + r * v)));
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+float lf_wider(float alpha, float coat_alpha) {
+    return pow(max(2.0 * pow(max(alpha, 1e-30), 1.412) + 0.5751 * pow(max(coat_alpha, 1e-30), 1.412), 1e-30), 0.7082153);
+}
+
+// What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
+float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
+    float back = eta * eta * (i.w.x * o.w.x + i.w.y * o.w.y);
+    return max(1.0 - (1.0 - min(alpha, 1.0)) * back, 0.0) / 3.1415927;
+}
+
+// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
+vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
+    float c2 = c * c;
+    float s2 = (1.0 - c) * (1.0 + c);
+    vec3 p = (eta - k) * (eta + k) - s2;
+    vec3 nk = eta * k;
+    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
+    vec3 larger = sqrt(0.5 * (q + abs(p)));
+    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 twice_ac = 2.0 * a * c;
+    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
+    float s4 = s2 * s2;
+    vec3 even = q * c2 + s4;
+    vec3 odd = twice_ac * s2;
+    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
+    return 0.5 * (rs + rp);
+}
+
+// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
+vec3 lf_evaluate(vec3 wi, vec3 wo) {
+    bool lit = wi.z > 0.0 && wo.z > 0.0;
+    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
+    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_coat.eta);
+    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_coat.alpha);
+    float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
+    float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
+    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    Crossing crossing = lf_pass_interface(lf_coat_top, lf_coat.eta, lf_coat.alpha, wi);
+    Crossing crossing2 = lf_pass_interface(lf_coat_top, lf_coat.eta, lf_coat.alpha, wo);
+    Crossing crossing3 = lf_pass_interface(lf_coat_both, lf_coat.eta, 1.0, wi);
+    Crossing crossing4 = lf_pass_interface(lf_coat_both, lf_coat.eta, 1.0, wo);
+    float there = lf_presence(max(lf_primer.eta, 1.0 / lf_primer.eta));
+    float alpha = lf_coat.alpha + there * (lf_primer.alpha - lf_coat.alpha);
+    float eta = lf_coat.eta * lf_primer.eta;
+    vec3 kept = lf_amount(lf_coat_passed, crossing3.s) * lf_amount(lf_coat_passed, crossing4.s);
+    float part = lf_direct(lf_base_share(crossing3, crossing4, lf_base.alpha), 0.3296, 0.3522, 1.803);
+    vec3 y = lf_upwards(lf_lean(crossing3, crossing3, crossing4, lf_base.alpha), lf_primer.eta);
+    vec3 left = lf_absorbed(lf_between(y, crossing, part), part * crossing.theta, lf_coat.tau);
+    y = lf_upwards(lf_lean(crossing4, crossing3, crossing4, lf_base.alpha), lf_primer.eta);
+    left = left * lf_absorbed(lf_between(y, crossing2, part), part * crossing2.theta, lf_coat.tau);
+    kept = kept * left;
+    float throughput = crossing.T * crossing2.T / (lf_coat.eta * lf_coat.eta);
+    float share = lf_base_share(crossing, crossing2, lf_primer.alpha);
+    vec3 yi = lf_lean(crossing, crossing, crossing2, lf_primer.alpha);
+    vec3 yo = lf_lean(crossing2, crossing, crossing2, lf_primer.alpha);
+    part = lf_direct(share, 0.3296, 0.3522, 1.803);
+    vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_coat.tau);
+    part = lf_direct(share, 0.3096, 0.2662, 1.772);
+    float path = lf_between(yi, crossing, part);
+    vec3 U = lf_projected(path, part * crossing.theta, lf_coat.tau);
+    part = lf_direct(share, 0.3296, 0.3522, 1.803);
+    A = A * lf_absorbed(lf_between(yo, crossing2, part), part * crossing2.theta, lf_coat.tau);
+    part = lf_direct(share, 0.3096, 0.2662, 1.772);
+    path = lf_between(yo, crossing2, part);
+    U = U * lf_projected(path, part * crossing2.theta, lf_coat.tau);
+    float F2 = lf_fresnel_dielectric(lf_half_cosine(yi, yo), lf_primer.eta);
+    float rise = 1.0 + 0.3036 * lf_presence(lf_coat.eta) * lf_coat.alpha * lf_coat.alpha * share;
+    float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, lf_primer.alpha, lf_primer.alpha);
+    vec3 again = 0.5 * F2 * (lf_amount(lf_coat_inner_again, crossing.s) + lf_amount(lf_coat_inner_again, crossing2.s));
+    vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(lf_primer.alpha, lf_coat.alpha), lf_primer.alpha);
+    vec3 root = lf_amount(lf_coat_inner_rest, crossing.s) * lf_amount(lf_coat_inner_rest, crossing2.s);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_coat.eta, lf_primer.alpha);
+    float throughput2 = crossing3.T * crossing4.T / (eta * eta);
+    share = lf_base_share(crossing3, crossing4, lf_base.alpha);
+    yi = lf_lean(crossing3, crossing3, crossing4, lf_base.alpha);
+    yo = lf_lean(crossing4, crossing3, crossing4, lf_base.alpha);
+    part = lf_direct(share, 0.3296, 0.3522, 1.803);
+    vec3 A2 = lf_absorbed(lf_between(yi, crossing3, part), part * crossing3.theta, lf_primer.tau);
+    part = lf_direct(share, 0.3096, 0.2662, 1.772);
+    path = lf_between(yi, crossing3, part);
+    vec3 U2 = lf_projected(path, part * crossing3.theta, lf_primer.tau);
+    part = lf_direct(share, 0.3296, 0.3522, 1.803);
+    A2 = A2 * lf_absorbed(lf_between(yo, crossing4, part), part * crossing4.theta, lf_primer.tau);
+    part = lf_direct(share, 0.3096, 0.2662, 1.772);
+    path = lf_between(yo, crossing4, part);
+    U2 = U2 * lf_projected(path, part * crossing4.theta, lf_primer.tau);
+    vec3 F3 = lf_fresnel_conductor(lf_half_cosine(yi, yo), lf_base.eta, lf_base.k);
+    rise = 1.0 + 0.3036 * lf_presence(eta) * alpha * alpha * share;
+    lobes = rise * lf_lobe(crossing3, crossing4, yi, yo, lf_base.alpha, lf_base.alpha);
+    again = 0.5 * F3 * (lf_amount(lf_coat_again, crossing3.s) + lf_amount(lf_coat_again, crossing4.s));
+    vec3 lobes3 = lobes + again * lf_lobe(crossing3, crossing4, yi, yo, lf_wider(lf_base.alpha, alpha), lf_base.alpha);
+    root = lf_amount(lf_coat_rest, crossing3.s) * lf_amount(lf_coat_rest, crossing4.s);
+    vec3 rest2 = root * root * lf_ahead(crossing3, crossing4, eta, lf_base.alpha);
+    return lit ? F * D * V + (throughput * A * (F2 * U * lobes2 + rest) + kept * (throughput2 * A2 * (F3 * U2 * lobes3 + rest2))) : vec3(0.0);
+}
+
+// BRDF [1/sr] in any frame.
+vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
+    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
+    return lf_evaluate(surface * l, surface * v);
+}
+
+#ifndef LF_LIBRARY
+
+#ifndef LF_LIGHTS
+#define LF_LIGHTS 1
+#endif
+
+in vec3 v_position;  // this, u_eye and u_light in one space, such as the world's
+in vec3 v_normal;
+out vec4 color;
+
+uniform vec3 u_eye;
+uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
+uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
+
+// Unit direction l to a light and the irradiance on a surface that faces it.
+vec3 lf_light(vec4 light, vec3 rgb, vec3 position, out vec3 l) {
+    vec3 away = light.xyz - position * light.w;
+    float distance2 = dot(away, away);
+    l = away * inversesqrt(distance2);
+    return rgb / (light.w > 0.0 ? distance2 : 1.0);
+}
+
+// Linear radiance, or sRGB (IEC 61966-2-1) for a screen when LF_SRGB is defined.
+vec3 lf_output(vec3 radiance) {
+#ifdef LF_SRGB
+    vec3 x = clamp(radiance, 0.0, 1.0);
+    return mix(12.92 * x, 1.055 * pow(max(x, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
+#else
+    return radiance;
+#endif
+}
+
+void main() {
+    vec3 n = normalize(v_normal);
+    vec3 v = normalize(u_eye - v_position);
+    vec3 radiance = vec3(0.0);
+    for (int k = 0; k < LF_LIGHTS; ++k) {
+        vec3 l;
+        vec3 irradiance = lf_light(u_light[k], u_light_rgb[k], v_position, l);
+        radiance += lf_brdf(n, v, l) * irradiance * max(dot(n, l), 0.0);
+    }
+    color = vec4(lf_output(radiance), 1.0);
+}
+
+#endif
