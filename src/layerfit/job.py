@@ -29,7 +29,7 @@ from .fit.words import structure
 from .forms.accuracy import against_walk
 from .forms.precise import Precise, refuses
 from .preset import model_name, preset_of
-from .render import predict
+from .render import brdf_values, predict
 from .report import advice, html, pictures, planes
 from .shader.export import Shader, print_material
 from .shader.gl import renderer
@@ -148,14 +148,9 @@ def _planes(result: FitResult, name: str) -> bytes | None:
     for view in result.views:
         if isinstance(view, MeasuredView):
             stack = scaled(result.stack, view.scales(result.stack))
-            if found := planes.planes(view.brdf, lambda wi, wo, stack=stack: _values(stack, wi, wo)):
+            if found := planes.planes(view.brdf, lambda wi, wo, stack=stack: brdf_values(stack, wi, wo)):
                 return planes.drawn(found, name)
     return None
-
-
-def _values(stack: Stack, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    """BRDF (n, 3) of pairs of directions (n, 3)."""
-    return predict(stack, wi[:, None], wo, np.ones((len(wi), 1, 3)))
 
 
 def _model(stack: Stack) -> dict[str, Any]:

@@ -100,6 +100,11 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, pl
     return np.concatenate(rows)[: len(wo)]
 
 
+def brdf_values(stack: Stack, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """BRDF (n, 3) [1/sr] of pairs of directions (n, 3), by what `predict` has compiled for one light."""
+    return predict(stack, wi[:, None], wo, np.ones((len(wi), 1, 3), np.float32))
+
+
 def begin(stack: Stack, lights: int, place: Place | None = None) -> None:
     """Have what `predict` needs for pixels of so many light samples compiled, while other work goes on."""
     _, each, size = _shares(lights)

@@ -16,12 +16,11 @@ import numpy as np
 from .documents import check_directory, finite, nearest, write_bytes, write_text
 from .errors import InputError
 from .fit.words import structure
-from .forms import precise
 from .preset import MODELS, model_name
 from .render import brdf
 from .report import truth as report
-from .stack import FORMS, IN_TIME, Stack
-from .walk import Estimate, check, hazes, top_lobe, walk
+from .stack import FORMS, Stack
+from .walk import Estimate, hazes, interface_of, refuses, top_lobe, walk
 
 INCIDENCE_DEG = (0.0, 20.0, 40.0, 60.0, 75.0)
 PLANE_DEG = (20.0, 60.0, 75.0)
@@ -74,7 +73,7 @@ def compare(
     many as the noise asks for. The same numbers for the same seed. Raises `InputError` for a material that has no walk.
     """
     if interface is None:
-        interface = stack.form.interface if isinstance(stack.form, precise.Precise) else "single"
+        interface = interface_of(stack)
     _check(stack, name, interface)
     forms = forms_of(stack, interface)
     hemispheres, planes = [_hemisphere(a) for a in INCIDENCE_DEG], [_plane(a) for a in PLANE_DEG]
@@ -142,15 +141,8 @@ def _check(stack: Stack, name: str, interface: str) -> None:
         raise InputError(f"--interface {interface}: should be single or multi{nearest(interface, ('single', 'multi'))}")
     if not stack.layers:
         raise InputError(f"{name}: there is no coat, so nothing to compare: every form is the base alone, and exact")
-    if any(kind.grows(stack.layers) for kind in IN_TIME):
-        raise InputError(f"{name}: it changes in time, from place to place; the random walk is through coats")
-    coloured = next((coat.name for coat in stack.layers if np.ndim(coat.tau_s)), None)
-    if coloured:
-        raise InputError(f"{name}: {coloured}.tau_s is a colour: the random walk scatters all channels alike; give one number")
-    try:
-        check(stack, interface, {})
-    except ValueError as error:
-        raise InputError(f"{name}: the random walk is not for this material: {error}") from None
+    if reason := refuses(stack, interface):
+        raise InputError(f"{name}: {reason}")
 
 
 def forms_of(stack: Stack, interface: str) -> dict[str, Any]:

@@ -163,11 +163,7 @@ class View:
 
         position = at(self.position)
         view = normalise(np.asarray(self.reference.camera.position) - position)
-        kept = {
-            name: None if (value := getattr(self, name)) is None else value[which]
-            for name in ("target", "noise", "tangent", "uv", "index")
-        }
-        return dataclasses.replace(self, normal=normalise(at(self.normal)), position=position, view=view, **kept)
+        return dataclasses.replace(self.some(which), normal=normalise(at(self.normal)), position=position, view=view)
 
     def samples(self, which: np.ndarray | None = None, quadrature: int = QUADRATURE, seed: int = 0) -> Samples:
         """Samples of all usable pixels, or of some."""

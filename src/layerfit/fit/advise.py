@@ -18,7 +18,7 @@ from ..capture.samples import Samples, View, load_reference
 from ..capture.scene import Constant, Directional, Reference, Scene
 from ..errors import InputError
 from ..stack import Stack
-from .blocks import arrange
+from .blocks import STRATA, arrange, strata
 from .parameters import Parametrisation, parametrise, with_fixed
 from .residuals import depths, rows
 from .uncertainty import WEAK_SIGMA
@@ -32,8 +32,6 @@ LIGHTS, CAMERAS = 64, 24
 
 THICKNESSES = (0.5, 2.0, 4.0)
 QUADRATURE = 496
-STRATA = 16
-"""Classes of half angles in which a form is off alike: its error does not average out over their pixels."""
 
 SIDEWAYS = 0.3
 """Cosine between two cameras above which they see enough of the same points."""
@@ -163,7 +161,7 @@ class _Asked:
         if not counts.any():
             return Told(np.zeros((self.free.size,) * 2), np.zeros((self.free.size,) * 2))
         share = len(view.index) / len(which)
-        return _told(jacobian[counts], model[counts], _stratum(samples)[pixel[counts]], self._noise(view, model[counts]), share)
+        return _told(jacobian[counts], model[counts], strata(samples)[pixel[counts]], self._noise(view, model[counts]), share)
 
     def _seen(self, reference: Reference) -> View:
         """All points of the first image of an object, from another camera and under other light."""
@@ -188,7 +186,8 @@ class _Asked:
 
 
 def _told(jacobian: np.ndarray, model: np.ndarray, stratum: np.ndarray, noise: np.ndarray, share: float) -> Told:
-    """J^T J and scatter of pixels that count for `share` of them each; the form is off alike at alike half angles, a channel each."""
+    """J^T J and scatter of pixels that count for `share` of them each; the form is off alike at alike half angles, a channel
+    each: its error does not average out over them."""
     off = np.hypot(MODEL_SHARE * model, FLOOR_SHARE * brightness(model))
     inverse_sigma = 1.0 / np.hypot(off, noise)
     weighted = jacobian * inverse_sigma[..., None]
@@ -197,14 +196,6 @@ def _told(jacobian: np.ndarray, model: np.ndarray, stratum: np.ndarray, noise: n
     by_form = weighted * (off * inverse_sigma)[..., None]
     alike = np.stack([by_form[stratum == s].sum(0) for s in range(STRATA)]).reshape(-1, gram.shape[0])
     return Told(gram, share * np.einsum("pci,pcj->ij", by_noise, by_noise) + share**2 * alike.T @ alike)
-
-
-def _stratum(samples: Samples) -> np.ndarray:
-    """Class of the half angle of each pixel, even in log(.05 + tan): about equal numbers for lobes of any width."""
-    wi = samples.wi[np.arange(len(samples.wi)), np.argmax(samples.weight.sum(-1), 1)]
-    h = wi + samples.wo
-    tan = np.hypot(h[:, 0], h[:, 1]) / np.maximum(h[:, 2], 1e-6)
-    return np.minimum((np.log1p(tan / 0.05) * 4.0).astype(int), STRATA - 1)
 
 
 def _images(reference: Reference, stack: Stack) -> Iterator[Image]:

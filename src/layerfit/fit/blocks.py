@@ -51,19 +51,27 @@ class Layout:
         return out
 
 
+STRATA = 16
+"""Classes of half angles."""
+
+
+def strata(samples: Samples) -> np.ndarray:
+    """Class of each pixel by its half angle, even in log(.05 + tan): about equal numbers for lobes of any width."""
+    strongest = np.argmax(samples.weight.sum(-1), 1)
+    wi = samples.wi[np.arange(len(strongest)), strongest]
+    h = wi + samples.wo
+    tan = np.hypot(h[:, 0], h[:, 1]) / np.maximum(h[:, 2], 1e-6)
+    return np.minimum((np.log1p(tan / 0.05) * 4.0).astype(int), STRATA - 1)
+
+
 def stratified(samples: Samples, seed: int) -> np.ndarray:
     """An order of the pixels in which every prefix has its share of each half angle.
 
     A highlight covers few pixels: of a thousand drawn at random, too few lie in it, and the fit finds a minimum without it.
     """
-    strongest = np.argmax(samples.weight.sum(-1), 1)
-    wi = samples.wi[np.arange(len(strongest)), strongest]
-    h = wi + samples.wo
-    tan = np.hypot(h[:, 0], h[:, 1]) / np.maximum(h[:, 2], 1e-6)
-    # Strata of equal width in log(.05 + tan): about equal numbers for lobes of any width.
-    stratum = np.minimum((np.log1p(tan / 0.05) * 4.0).astype(int), 15)
+    stratum = strata(samples)
     rng = np.random.default_rng(seed)
-    key = np.empty(len(tan))
+    key = np.empty(len(stratum))
     for s in np.unique(stratum):
         members = rng.permutation(np.flatnonzero(stratum == s))
         key[members] = (np.arange(len(members)) + rng.random()) / len(members) ** 0.75

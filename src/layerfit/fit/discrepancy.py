@@ -17,9 +17,8 @@ from .. import walk
 from .._compiled import Compiled
 from ..capture.load import AnyView
 from ..capture.samples import Samples, View
-from ..forms.precise import Precise
-from ..render import predict
-from ..stack import IN_TIME, Stack
+from ..render import brdf_values
+from ..stack import Stack
 from .residuals import scaled
 from .uncertainty import newton
 
@@ -45,29 +44,14 @@ class Discrepancy:
 
 def unmeasured(stack: Stack) -> str | None:
     """Why the random walk cannot tell the form's error for a material; None where it can, or where there is none."""
-    if not stack.layers:
-        return None
-    if any(kind.grows(stack.layers) for kind in IN_TIME):
-        return "the random walk is through coats; this material changes from place to place"
-    if any(np.ndim(coat.tau_s) for coat in stack.layers):
-        return "the random walk scatters all channels alike"
-    try:
-        walk.check(stack, interface(stack), {})
-    except ValueError as refusal:
-        return str(refusal)
-    return None
-
-
-def interface(stack: Stack) -> Any:
-    """What rough boundaries do to light in a material's form."""
-    return stack.form.interface if isinstance(stack.form, Precise) else "single"
+    return walk.refuses(stack, walk.interface_of(stack)) if stack.layers else None
 
 
 def begin(stack: Stack) -> None:
     """Have what `measure` needs compiled, while other work goes on."""
     stack = jax.tree.map(np.asarray, stack)  # numbers of NumPy: a comparison is not worth a compiler's time
     if stack.layers and not unmeasured(stack):
-        walk.begin(stack, interface(stack), walk.hazes(stack))
+        walk.begin(stack, walk.interface_of(stack), walk.hazes(stack))
 
 
 def measure(
@@ -116,19 +100,14 @@ def _off(stack: Stack, view: AnyView, samples: Samples, pixels: np.ndarray, rng:
     light = np.argmax(np.cumsum(chance, -1) > rng.random((len(pixels), 1)), -1)
     each = np.arange(len(pixels))
     wi, wo, weight = samples.wi[pixels, light], samples.wo[pixels], samples.weight[pixels, light]
-    form = _brdf(stack, wi, wo)
-    rows = jax.tree.map(lambda x: np.asarray(x, np.float32)[None], (stack, walk.hazes(stack)))
-    walked = walk.walk_rows(rows[0], wi, wo, paths=PATHS, seed=0, interface=interface(stack), haze=rows[1])
+    form = brdf_values(stack, wi, wo)
+    walked = walk.walk(stack, wi, wo, paths=PATHS, interface=walk.interface_of(stack), haze=walk.hazes(stack))
     off = (form - _top(stack, wi, wo) - walked.mean) * weight
     if isinstance(view, View) and view.exact:
         which = np.searchsorted(view.index, samples.index[pixels])
         inside = [view.moved(which, dx, dy).samples() for dx in PLACES for dy in PLACES]
-        off += form * weight - np.mean([_brdf(stack, s.wi[each, light], s.wo) * s.weight[each, light] for s in inside], 0)
+        off += form * weight - np.mean([brdf_values(stack, s.wi[each, light], s.wo) * s.weight[each, light] for s in inside], 0)
     return off / chance[each, light, None]
-
-
-def _brdf(stack: Stack, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    return predict(stack, wi[:, None], wo, np.ones((len(wi), 1, 3), np.float32))
 
 
 def _lobe(coat: Any, wi: Any, wo: Any) -> Any:

@@ -7,5 +7,12 @@ many threads share the work.
 """
 
 from ._interface import Scattered as Scattered, scatter as scatter
-from ._material import Haze as Haze, Interface as Interface, check as check, hazes as hazes
+from ._material import (
+    Haze as Haze,
+    Interface as Interface,
+    check as check,
+    hazes as hazes,
+    interface_of as interface_of,
+    refuses as refuses,
+)
 from ._walk import Estimate as Estimate, begin as begin, top_lobe as top_lobe, walk as walk, walk_rows as walk_rows

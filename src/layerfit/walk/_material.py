@@ -8,8 +8,9 @@ import numpy as np
 
 from .._chunk import static, struct
 from .._types import Number, Scalar
+from ..forms.precise import Precise
 from ..optics.microfacet import Distribution
-from ..stack import Stack
+from ..stack import IN_TIME, Stack
 from ..surfaces.microfacet import Microfacets
 from ._facets import Widths
 
@@ -101,6 +102,25 @@ def hazes(stack: Stack) -> dict[str, Haze]:
     """The coats of a material that scatter, as the walk knows them."""
     scatters = [coat for coat in stack.layers if coat.tau_s is not None]
     return {coat.name: Haze(coat.tau_s, 0.0 if coat.g is None else coat.g) for coat in scatters}
+
+
+def interface_of(stack: Stack) -> Interface:
+    """What the rough boundaries of a material do to light, by the form that it is in."""
+    return stack.form.interface if isinstance(stack.form, Precise) else "single"
+
+
+def refuses(stack: Stack, interface: Interface) -> str | None:
+    """Why the walk cannot judge the forms of a material with coats, or None."""
+    if any(kind.grows(stack.layers) for kind in IN_TIME):
+        return "it changes in time, from place to place; the random walk is through coats"
+    coloured = next((coat.name for coat in stack.layers if np.ndim(coat.tau_s)), None)
+    if coloured:
+        return f"{coloured}.tau_s is a colour: the random walk scatters all channels alike; give one number"
+    try:
+        check(stack, interface, {})
+    except ValueError as error:
+        return f"the random walk is not for this material: {error}"
+    return None
 
 
 def _relative(base: Any, above: Any) -> Any:

@@ -37,14 +37,16 @@ def walk(
     interface: Interface = "single",
     haze: Mapping[str, Haze] | None = None,
 ) -> Estimate:
-    """BRDF [1/sr] of the light that comes from below the top interface, for one direction of light and several of view.
+    """BRDF [1/sr] of the light that comes from below the top interface.
 
-    `wi` (3,), `wo` (n, 3): unit, away from the surface, above it. `paths`: for every row of `wo`, at least. `haze`: scattering in
-    the medium of coats, by their names. The light that the top interface reflects is `top_lobe`, to be added.
+    `wi` (3,) or one for each of `wo`, (n, 3), `wo` (n, 3): unit, away from the surface, above it. `paths`: for every row of `wo`, at least.
+    `haze`: scattering in the medium of coats, by their names. The light that the top interface reflects is `top_lobe`, to be added.
     """
     wo = np.asarray(wo, np.float32)
     rows = jax.tree.map(lambda x: np.asarray(x, np.float32)[None], (stack, dict(haze or {})))
-    return walk_rows(rows[0], np.asarray(wi, np.float32)[None], wo, paths=paths, seed=seed, interface=interface, haze=rows[1])
+    return walk_rows(
+        rows[0], np.atleast_2d(np.asarray(wi, np.float32)), wo, paths=paths, seed=seed, interface=interface, haze=rows[1]
+    )
 
 
 def walk_rows(
