@@ -1,0 +1,145 @@
+"""Commands that fit: `fit`, `structures`, and `advise`, which is asked before a fit."""
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .app import STARTED, Json, Scene, app, check_choice, emit, progress, say, stderr
+
+
+@app.command()
+def fit(
+    scene: Scene,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    starts: Annotated[
+        int | None, typer.Option(min=1, help="Starts that are tried; more find a global minimum more surely.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")] = None,
+    metric: Annotated[str | None, typer.Option(help="law, uniform, relative, log or cube_root.")] = None,
+    loss: Annotated[str | None, typer.Option(help="square, huber or cauchy.")] = None,
+    profile: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--profile",
+            help="Parameter whose 95 % interval is found by fitting the others again, such as coat.tau; may be repeated.",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fit a material to a reference render or a measured BRDF.
+
+    Leaves `fit.json`, `preset.json`, `material.frag`, `report.html`, `fit.png` and `trace.csv` in the output directory.
+
+    Example: `layerfit fit examples/references/lacquered_copper.toml -o out/copper`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..capture.scene import LOSSES, METRICS
+    from ..job import fit_scene
+
+    imported = time.perf_counter() - STARTED
+    check_choice(loss, LOSSES, "--loss")
+    check_choice(metric, METRICS, "--metric")
+    with progress() as report:
+        outcome = fit_scene(
+            scene,
+            output,
+            import_s=imported,
+            progress=report,
+            profile=profile or (),
+            starts=starts,
+            seed=seed,
+            metric=metric,
+            loss=loss,
+        )
+    _show_fit(outcome, as_json)
+    raise typer.Exit(0 if outcome.good else 1)
+
+
+def _show_fit(outcome: Any, as_json: bool) -> None:
+    from ..report.text import lines
+
+    for line in lines(outcome.document):
+        say(line)
+    say(f"Wrote fit.png, report.html, material.frag, preset.json, fit.json and trace.csv in {outcome.directory}/")
+    if as_json:
+        emit(outcome.document)
+
+
+@app.command()
+def structures(
+    reference: Annotated[Path, typer.Argument(help="Scene file, or a measured BRDF: .brdf, .bsdf, .binary or .csv.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    only: Annotated[str | None, typer.Option(help="Names of structures to try, with commas; left out, all.")] = None,
+    metric: Annotated[str, typer.Option(help="law, uniform, relative, log or cube_root.")] = "log",
+    min_half_deg: Annotated[
+        float, typer.Option(min=0.0, max=89.0, help="Of a measured BRDF: leave out what is nearer to the mirror direction.")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of starts and pixel choices.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Find out which structure a reference supports: fit candidates, and choose the simplest that explains it.
+
+    Leaves `structures.json` and `structures.png` in the output directory, beside what a fit of the chosen one leaves. Exit code 1: it
+    does not explain the reference, or its fit has findings.
+
+    Example: `layerfit structures paint.bsdf -o out/paint`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..capture.scene import METRICS
+    from ..report.structures import table
+    from ..structures import structures_of
+
+    check_choice(metric, METRICS, "--metric")
+    names = None if only is None else [name.strip() for name in only.split(",")]
+    with progress() as report:
+        outcome = structures_of(
+            reference, output, structures=names, metric=metric, seed=seed, min_half_deg=min_half_deg, progress=report
+        )
+    stderr.print(table(outcome.document))
+    for sentence in outcome.document["in_words"]:
+        say(sentence)
+    say(f"Wrote structures.png and structures.json in {output}/, and of the fit fit.png, report.html, preset.json and fit.json")
+    if as_json:
+        emit(outcome.document)
+    raise typer.Exit(0 if outcome.good else 1)
+
+
+@app.command()
+def advise(
+    scene: Scene,
+    preset: Annotated[
+        Path | None,
+        typer.Option("--preset", help="The material to ask about, such as a fitted one; left out, the scene's start."),
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for advice.json and advice.png.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Say what the images of a scene determine of its material, and which further light, camera or thickness would help most.
+
+    Exit code 1: something that is free is not determined.
+
+    Example: `layerfit advise examples/references/varnished_wood.toml -o out/advice`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..capture.scene import read_scene
+    from ..job import write_advice
+    from ..preset import read_preset
+    from ..report.advice import lines
+
+    with progress() as report:
+        document = write_advice(read_scene(scene), None if preset is None else read_preset(preset), output, report)
+    for line in lines(document):
+        say(line)
+    if output is not None:
+        say(f"Wrote advice.png and advice.json in {output}/")
+    if as_json:
+        emit(document)
+    raise typer.Exit(0 if all(row["identifiable"] for row in document["parameters"].values()) else 1)

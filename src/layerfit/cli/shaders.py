@@ -1,0 +1,73 @@
+"""Commands about the shader of a material: `export` and `verify`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .app import Json, Preset, app, emit, say
+
+
+@app.command()
+def export(
+    preset: Preset,
+    target: Annotated[str, typer.Option(help="glsl330 or essl300.")] = "glsl330",
+    uniforms: Annotated[
+        bool, typer.Option("--uniforms", help="Parameters as uniforms, for live tuning, not as constants.")
+    ] = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Shader to write; left out, standard output.")] = None,
+) -> None:
+    """Print the shader of a preset.
+
+    Example: `layerfit export out/preset.json --target essl300 -o copper.frag`
+    """
+    from ..documents import nearest, write_text
+    from ..errors import InputError
+    from ..preset import read_preset
+    from ..shader.export import HEADERS, print_material
+
+    if target not in HEADERS:
+        raise InputError(f"--target {target}: should be one of {', '.join(HEADERS)}{nearest(target, HEADERS)}")
+    text = print_material(read_preset(preset), preset.stem, uniforms).text(target)
+    if output is None:
+        sys.stdout.write(text)
+    else:
+        write_text(output, text)
+        say(f"Wrote {output}")
+
+
+@app.command()
+def verify(
+    preset: Preset,
+    scene: Annotated[Path | None, typer.Argument(help="Scene file: also compare pixels with its references.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the picture strip.")] = None,
+    as_json: Json = False,
+    fail: Annotated[float | None, typer.Option(help="Relative difference from JAX that p99.9 of the values may have.")] = None,
+    hardfail: Annotated[float | None, typer.Option(help="Relative difference from JAX that any value may have.")] = None,
+) -> None:
+    """Render the printed shader of a preset in OpenGL and compare it with JAX, number by number, and with references.
+
+    Example: `layerfit verify out/preset.json scene.toml -o out`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..job import verify_preset
+    from ..preset import read_preset
+    from ..report.text import image_error, relative, verdict, worst
+
+    document, picture = verify_preset(read_preset(preset), preset.stem, scene, output, fail, hardfail)
+    parity = document["parity"]
+    say(f"Drawn by {document['renderer']}")
+    most, usual = relative(parity["max_rel"]), relative(parity["p999_rel"])
+    say(f"shader against JAX: max {most}, p99.9 {usual} relative, {parity['values']} values")
+    say(f"worst value: {worst(parity['worst'])}")
+    if document["image"]:
+        say(f"shader against reference: {image_error(document['image'])}")
+    if picture:
+        say(f"Wrote {picture}")
+    say(verdict(document))
+    if as_json:
+        emit(document)
+    raise typer.Exit(0 if document["passed"] else 1)
