@@ -34,7 +34,7 @@ BRANCHES = [
         {"shader.printer"},
         {"shader.export"},
         {"shader.gl"},
-        {"shader.verify"},
+        {"shader.verify", "shader.cost"},
     ],
 ]
 """Two ladders that stand on the first and never import each other."""

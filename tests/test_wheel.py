@@ -43,7 +43,7 @@ def test_types_ship():
 
 
 def test_data_ship():
-    for name in ("material.frag", "samples.frag", "brdf.glsl", "lights.glsl", "output.glsl"):
+    for name in ("material.frag", "samples.frag", "cost.frag", "brdf.glsl", "lights.glsl", "output.glsl", "phong.glsl"):
         assert (shaders() / name).is_file(), name
     scenes = {path.stem for path in references().glob("*.toml")}
     assert {"lacquered_copper", "varnished_wood", "brushed_steel", "coated_paint"} <= scenes

@@ -68,6 +68,13 @@ def compile_points(fragment: str, attributes: Mapping[str, int]) -> moderngl.Pro
         raise MachineError(f"the GL driver ({renderer()}) does not compile the shader:\n{error}") from None
 
 
+def set_uniforms(program: moderngl.Program, uniforms: Mapping[str, object]) -> None:
+    """Give a program its uniforms; those that its compiler dropped are left out."""
+    for name, value in uniforms.items():
+        if isinstance(member := program.get(name, None), moderngl.Uniform):
+            member.value = value
+
+
 def shade_points(
     fragment: str,
     attributes: Mapping[str, np.ndarray],
@@ -86,13 +93,11 @@ def shade_points(
     width = min(1024, max(2, math.ceil(math.sqrt(n + 1))))
     height = (n + 1 + width - 1) // width  # at least one pixel more than rows: the sentinel
     program = compile_points(fragment, {name: a.shape[-1] for name, a in attributes.items()})
-    for name, value in (uniforms or {}).items():
-        if isinstance(member := program.get(name, None), moderngl.Uniform):
-            member.value = value
+    set_uniforms(program, uniforms or {})
     row, column = np.divmod(np.arange(n), width)
     pixel = np.stack([(column + 0.5) / width * 2.0 - 1.0, (row + 0.5) / height * 2.0 - 1.0], -1).astype("f4")
     used = {name: a for name, a in attributes.items() if f"a_{name}" in program}
-    target = _target((width, height))
+    target = float_target((width, height))
     buffers = {name: ctx.buffer(reserve=n * a.shape[-1] * 4) for name, a in used.items()}
     pixels = ctx.buffer(pixel.tobytes())
     content = [(pixels, "2f", "a_pixel")] + [(buffers[name], f"{a.shape[-1]}f", f"a_{name}") for name, a in used.items()]
@@ -119,7 +124,7 @@ def shade_points(
 _targets: list[moderngl.Framebuffer] = []
 
 
-def _target(size: tuple[int, int]) -> moderngl.Framebuffer:
+def float_target(size: tuple[int, int]) -> moderngl.Framebuffer:
     """A float32 framebuffer of this size, in use; the previous one is kept where it fits and released where not."""
     if _targets and _targets[0].size == size:
         return _targets[0]
