@@ -4,6 +4,7 @@ Data on standard output, tables and progress on standard error. Exit codes: 0 do
 the machine is at fault, with a message that says what to do.
 """
 
+import gc
 import json
 import sys
 import time
@@ -33,6 +34,9 @@ Preset = Annotated[Path, typer.Argument(help="Preset file (JSON): a material.")]
 
 def main() -> None:
     """Run the command line; every fault of input or machine is one message and exit code 2."""
+    gc.set_threshold(
+        50_000, 20, 20
+    )  # a trace makes objects by the million, few of them rubbish: looking for it was a tenth of its time
     try:
         app()
     except LayerfitError as error:

@@ -146,9 +146,11 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
 
 def diffuse_return(nodes: Nodes, tau: Colour | None) -> Colour:
     """Part of diffuse light that comes back from the coat: 2 int R exp(-2 tau / mu) mu dmu."""
+    if tau is None:
+        return jnp.asarray(nodes.weights.sum())
     total: Any = 0.0
     for k in range(2 * GAUSS):
-        kept = 1.0 if tau is None else jnp.exp(-(2.0 * tau) * safe_divide(1.0, jnp.asarray(nodes.cosines[k])))
+        kept = jnp.exp(-(2.0 * tau) * safe_divide(1.0, jnp.asarray(nodes.cosines[k])))
         total = total + nodes.weights[k] * kept
     return jnp.asarray(total)
 

@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..geometry import normalise, sphere_surface, sphere_tangent, sphere_uv
 from ..samples import View
@@ -53,6 +52,8 @@ def sphere_of(view: MeasuredView) -> View:
 
 def interpolated(brdf: MeasuredBrdf, wi: np.ndarray, wo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """BRDF (n, 3) at pairs of directions (n, 3) from the nearest samples, by inverse squared distance, and whether they are near (n,)."""
+    from scipy.spatial import KDTree  # late: a fit of renders starts a tenth of a second sooner
+
     known = coordinates(brdf.wi, brdf.wo)
     tree = KDTree(known)
     spacing = np.quantile(tree.query(known, NEIGHBOURS + 1)[0][:, -1], 0.9)
