@@ -3,8 +3,9 @@
     python benchmarks/recovery.py FOLDER [FOLDER ...] [--only NAME] [--model MODEL]
 
 Folders of renders with known materials, such as examples/references; see `renders.py`. Prints one row a render, and for the values and for those
-without the error of their form the median and 90th percentile over all parameters; optical depths are compared with a floor of .3. And how
-many truths are within one, two and three sigma of the value.
+without the error of their form the median and 90th percentile over all parameters that have a sigma; optical depths are compared with a floor
+of .3. And how many truths are within one, two and three sigma of the value, how many lower limits are below the truth, and how much was said
+to be undetermined.
 """
 
 import argparse
@@ -51,6 +52,25 @@ def pulls(rows: dict[str, Any], truth: dict[str, Any]) -> list[float]:
     return found
 
 
+def limits(rows: dict[str, Any], truth: dict[str, Any]) -> list[bool]:
+    """Whether the truth is above each lower limit."""
+    found = []
+    for name in rows.keys() & truth.keys():
+        if rows[name].get("lower_limit"):
+            wanted, ends = np.atleast_1d(truth[name]), rows[name]["interval_95"]
+            found += [w >= end[0] for w, end in zip(wanted, ends, strict=True) if end is not None and end[0] and end[1] is None]
+    return found
+
+
+def known(rows: dict[str, Any]) -> set[str]:
+    """Names of the numbers that have a sigma; channels apart."""
+    found = set()
+    for name, row in rows.items():
+        sigma = np.atleast_1d(np.array(row["sigma"], float))
+        found |= {name if len(sigma) == 1 else f"{name}[{k}]" for k in np.flatnonzero(np.isfinite(sigma))}
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="+", type=Path)
@@ -60,6 +80,8 @@ def main() -> None:
     table = Table("render", "found", "corrected", "true", "worst error", "corrected", "residual", "seconds")
     every: dict[str, list[float]] = {"value": [], "corrected": []}
     pulled: list[float] = []
+    limited: list[bool] = []
+    unknown = 0
     with tempfile.TemporaryDirectory() as scratch:
         for folder in arguments.folders:
             for render in renders(folder, Path(scratch), arguments.model):
@@ -68,8 +90,11 @@ def main() -> None:
                 result, seconds = fitted(render)
                 rows = parameters(result)
                 off = {key: errors(render, {name: row.get(key, row["value"]) for name, row in rows.items()}) for key in every}
+                said = known(rows)
                 for key, values in off.items():
-                    every[key] += values.values()
+                    every[key] += [error for name, error in values.items() if name in said]
+                limited += limits(rows, render.truth)
+                unknown += len(off["value"].keys() - said)
                 pulled += pulls(rows, render.truth)
                 columns = [
                     [f"{name} {_text(row['value'])} +/- {_text(row['sigma'])}" for name, row in rows.items()],
@@ -94,6 +119,9 @@ def main() -> None:
     if pulled:
         within = (f"{np.mean(np.abs(pulled) <= k):.3f}" for k in (1, 2, 3))
         console.print(f"{len(pulled)} with a sigma: within one, two, three sigma {', '.join(within)}")
+    console.print(
+        f"{unknown} without: {len(limited)} lower limits, {sum(limited)} of them below the truth; the others undetermined"
+    )
 
 
 def _text(value: Any) -> str:

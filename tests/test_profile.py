@@ -60,6 +60,7 @@ def test_what_is_seen_is_no_lower_limit():
 def test_the_threshold_is_of_chi_square_and_of_what_no_noise_explains():
     assert threshold(2.0, 0.0) == pytest.approx(3.841)
     assert threshold(2.0, 400.0) == pytest.approx(3.841 + 100.0)
+    assert threshold(2.0, 400.0, 7.0) == pytest.approx(3.841 + 107.0), "and of what the form is known to get wrong"
 
 
 @pytest.mark.parametrize("slot", [0, 1])
@@ -92,8 +93,25 @@ def test_a_depth_that_hides_the_base_is_a_lower_limit(result):
         assert upper is None
         assert 1.0 < lower < 6.0
     assert blue is None, "the base is seen there, and no profile was asked for"
+    row = document["parameters"]["coat.tau"]
+    assert row["sigma"][:2] == [None, None], "a limit has no sigma"
+    assert row["sigma"][2] > 0.0
+    assert document["parameters"]["base.alpha"]["identifiable"], "blue shows it"
     line = next(line for line in said(document["parameters"]) if "coat.tau" in line)
     assert f"at least [{red[0]:.4g}, {green[0]:.4g}, " in line
+
+
+def test_below_a_coat_that_may_be_opaque_nothing_is_known(tmp_path):
+    stack = dataclasses.replace(DEEP, layers=(dataclasses.replace(DEEP.layers[0], tau=np.full(3, 3.0)),))
+    view = sphere_view(stack, tmp_path, 32)
+    noise = 0.05 * view.target**0.7
+    noisy = view.target + noise * np.random.default_rng(0).normal(size=noise.shape)
+    document = to_json(
+        fit([dataclasses.replace(view, target=noisy, noise=noise)], stack, starts=1), {}, None, {}, "preset.json"
+    )
+    assert {"lower_limit:coat.tau", "not_identifiable:base.alpha"} <= set(document["flags"])
+    assert document["parameters"]["base.alpha"]["sigma"] is None
+    assert document["parameters"]["coat.eta"]["sigma"] > 0.0
 
 
 def test_an_interval_that_is_asked_for_holds_the_truth(result):

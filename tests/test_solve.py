@@ -167,7 +167,7 @@ def test_sigmas_are_the_scatter_of_repeated_fits(noise):
         u, state, _ = minimise(TRUTH, target=target)
         rows = dense(jacobian(u, target, residual), SLOTS)
         found.append(u)
-        sigmas.append(estimate(np.asarray(state.gram), np.zeros(5, bool), *rows, part).sigma)
+        sigmas.append(estimate(np.asarray(state.gram), *rows, part).sigma)
     np.testing.assert_allclose(np.sqrt(np.mean(np.square(sigmas), 0)), np.std(found, 0), rtol=0.25)  # of a hundred: 7 %
 
 
@@ -176,14 +176,22 @@ def test_misfit_that_neighbours_share_widens_a_sigma():
     offsets = np.random.default_rng(0).normal(size=12)
     offsets -= offsets.mean()
     residual, part = np.repeat(offsets, 50)[:, None], np.repeat(np.arange(12), 50)
-    found = estimate(np.array([[600.0]]), np.zeros(1, bool), np.ones((600, 1, 1)), residual, part)
+    found = estimate(np.array([[600.0]]), np.ones((600, 1, 1)), residual, part)
     np.testing.assert_allclose(found.sigma, np.std(offsets, ddof=1) / np.sqrt(12), rtol=0.05)
+
+
+def test_an_error_that_all_pixels_have_together_is_not_averaged_away():
+    rng = np.random.default_rng(0)
+    residual, part = 0.1 * rng.normal(size=(600, 1)), np.arange(600) % 12
+    alone = estimate(np.array([[600.0]]), np.ones((600, 1, 1)), residual, part)
+    together = estimate(np.array([[600.0]]), np.ones((600, 1, 1)), residual, part, [np.full((600, 1), 0.3)])
+    np.testing.assert_allclose(together.sigma, np.hypot(alone.sigma, 0.3), rtol=1e-6)
 
 
 def test_a_direction_that_nothing_sees_is_named():
     gram = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 2.0]])
     jacobian = np.repeat([[[1.0, 1.0, 0.0]], [[0.0, 0.0, 2.0**0.5]]], 12, 0) / 12**0.5
-    found = estimate(gram, np.zeros(3, bool), jacobian, np.full((24, 1), 0.1), np.arange(24) % 12)
+    found = estimate(gram, jacobian, np.full((24, 1), 0.1), np.arange(24) % 12)
     assert len(found.blind) == 1
     np.testing.assert_allclose(np.abs(found.blind[0]), [0.5**0.5, 0.5**0.5, 0.0], atol=1e-9)
     assert np.all(found.sigma[:2] > 10.0 * found.sigma[2]), "what is not seen is not known"

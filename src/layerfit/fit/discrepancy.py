@@ -40,6 +40,9 @@ class Discrepancy:
     """From the fitted vector to where it would be."""
     error: np.ndarray
     """Standard error of that: few pixels, few paths."""
+    cost: np.ndarray
+    """(3,) what the form's error alone would cost: half its weighted sum of squares over all pixels, by channel. 0 where light is a quadrature,
+    of which the walk sees one sample a pixel."""
 
 
 def unmeasured(stack: Stack) -> str | None:
@@ -62,33 +65,35 @@ def measure(
     jacobian: np.ndarray,
     inverse_sigma: np.ndarray,
     gram: np.ndarray,
-    held: np.ndarray,
     seed: int,
 ) -> Discrepancy:
     """Ask the random walk what the form of a fitted material is off by, and the fit what that makes of its parameters.
 
     `place` has the reference and the pixel of each row of `jacobian` (rows, channels, parameters) and `inverse_sigma` (rows, channels), -1
-    for rows that do not count; `gram` is J^T J, and parameters that are `held` stay. A bare surface has no error: it is exact.
+    for rows that do not count; `gram` is J^T J. A bare surface has no error: it is exact.
     """
     if not stack.layers:
-        return Discrepancy(np.zeros(len(gram)), np.zeros(len(gram)))
+        return Discrepancy(np.zeros(len(gram)), np.zeros(len(gram)), np.zeros(3))
     rng = np.random.default_rng(seed)
-    chance = _chance(jacobian, gram, held, place[0] >= 0)
+    chance = _chance(jacobian, gram, place[0] >= 0)
     drawn = rng.choice(len(chance), PAIRS, p=chance)
-    off = np.zeros((PAIRS, 3))
+    off, exact = np.zeros((PAIRS, 3)), np.zeros(PAIRS)
     for k, (view, seen) in enumerate(zip(views, samples, strict=True)):
         here = place[0][drawn] == k
         if here.any():
             off[here] = _off(scaled(stack, view.scales(stack)), view, seen, place[1][drawn[here]], rng)
-    pull = np.einsum("pci,pc->pi", jacobian[drawn], off * inverse_sigma[drawn]) / chance[drawn, None]
-    steps = newton(gram, held, pull)
-    return Discrepancy(steps.mean(0), steps.std(0, ddof=1) / np.sqrt(PAIRS))
+            exact[here] = view.exact
+    off *= inverse_sigma[drawn]
+    pull = np.einsum("pci,pc->pi", jacobian[drawn], off) / chance[drawn, None]
+    steps = newton(gram, pull)
+    cost = 0.5 * np.mean((exact / chance[drawn])[:, None] * off**2, 0)
+    return Discrepancy(steps.mean(0), steps.std(0, ddof=1) / np.sqrt(PAIRS), cost)
 
 
-def _chance(jacobian: np.ndarray, gram: np.ndarray, held: np.ndarray, counts: np.ndarray) -> np.ndarray:
+def _chance(jacobian: np.ndarray, gram: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Of each pixel to be drawn: half evenly, half by its leverage, its part in what determines the parameters."""
     rows = jacobian.reshape(-1, jacobian.shape[-1])
-    leverage = np.sum(rows * newton(gram, held, rows), -1).reshape(len(jacobian), -1).sum(-1)
+    leverage = np.sum(rows * newton(gram, rows), -1).reshape(len(jacobian), -1).sum(-1)
     leverage = np.where(counts, np.maximum(leverage, 0.0), 0.0)
     return 0.5 * counts / counts.sum() + 0.5 * leverage / leverage.sum()
 

@@ -21,13 +21,13 @@ from . import discrepancy
 from .blocks import Block, arrange, channels_first
 from .difference import Curve, compared, curve, slope
 from .parameters import LIGHT, parametrise, with_fixed
-from .profile import Profile, along, deep, lower_limit, scatter, threshold
+from .profile import ABSORBING, Profile, along, deep, lower_limit, scatter, threshold
 from .residuals import NEAR, begin, begin_solver, depths, initial, rows, scaled, step
 from .result import FitResult, Held, Row
 from .solve import NormalLevenbergMarquardt
 from .starts import FINE_STEPS, LEVEL, SCREENED, Minimum, distinct, in_sight, ranked, search, space_filling
 from .uncertainty import GROUPS, Uncertainty, estimate
-from .weights import brightness, inverse_sigma, misfit, robust
+from .weights import Lost, brightness, inverse_sigma, lost, misfit, noise_law, robust
 
 PIXELS = 65536
 """Pixels that a fit uses at most, all references together: more of them do not change the answer by what it can be wrong by."""
@@ -126,13 +126,12 @@ class _Fit:
             best, converged = self._descend(best, self.blocks, FINE_STEPS, f"fine {k + 1}")
             self.progress("fine", (k + 1) / ROUNDS)
         u, cost, gram = best.vector, best.cost, best.gram
-        held = (u <= self.bounds[0]) | (u >= self.bounds[1])
         jacobian, residual = rows(u, self.start, self.blocks, free=self.free)
-        uncertainty = estimate(gram, held, jacobian, residual, self._sectors())
+        uncertainty = estimate(gram, jacobian, residual, self._sectors(), self._alike())
         models = self._models(u, self.samples)
-        off = self._discrepancy(u, models, jacobian, gram, held) if self.model_error else None
+        off = self._discrepancy(u, models, jacobian, gram) if self.model_error else None
         beyond = misfit(models, self.samples, self._weights(models, "law"))
-        profiles = self._profiles(best, beyond, uncertainty)
+        profiles, hidden = self._profiles(best, beyond, uncertainty, np.zeros(3) if off is None else off.cost)
         clock = CLOCK.since(self.clock)
         return FitResult(
             stack=self._material(u),
@@ -154,31 +153,51 @@ class _Fit:
             models=models,
             misfit=beyond,
             profiles=profiles,
+            hidden=hidden,
             samples=self.samples,
             views=self.views,
             clock=clock,
             solve_s=time.perf_counter() - self.began - clock.trace_s - clock.compile_s,
         )
 
-    def _profiles(self, best: Minimum, misfit: float, uncertainty: Uncertainty) -> list[Profile]:
-        """Profiles of the parameters that were asked for; and of depths that are but lower limits."""
+    def _profiles(
+        self, best: Minimum, misfit: float, uncertainty: Uncertainty, form: np.ndarray
+    ) -> tuple[list[Profile], list[str]]:
+        """Profiles of the parameters that were asked for, and of depths that are but lower limits; and what those hide altogether.
+
+        `form` (3,) is what the form gets wrong, by channel: that of one channel can hide a depth of that channel only.
+        """
         residuals = sum(s.target.size for s in self.samples)
         unexplained, even = 0.5 * misfit**2 * self._brightness(self.blocks), 2.0 * best.cost / residuals
         asked = [slot for f in self.free.free if f.name in self.profile for slot in f.slots]
         deeper = [slot for slot in deep(self.free.free, self._material(best.vector)) if slot not in asked]
-        found: list[Profile | None] = []
+        hides = {slot: form[k] if len(f.slots) == 3 else form.sum() for f in self.free.free for k, slot in enumerate(f.slots)}
+        widest = max([even, *(scatter(best.gram, uncertainty.covariance, slot) for slot in deeper)])
+        found: list[Profile] = []
         for slot in (*asked, *deeper):
             lower, upper = self.bounds[0][slot], self.bounds[1][slot]
             first = float(np.clip(uncertainty.sigma[slot], 1e-3 * (upper - lower), 0.03 * (upper - lower)))
             run = along if slot in asked else lower_limit
-            limit = threshold(max(even, scatter(best.gram, uncertainty.covariance, slot)), unexplained) + 1e-30
-            found.append(run(self._refit, best.vector, best.cost, slot, first, limit, (lower, upper)))
-        return [profile for profile in found if profile]
+            limit = threshold(max(even, scatter(best.gram, uncertainty.covariance, slot)), unexplained, hides[slot]) + 1e-30
+            profile = run(self._refit, best.vector, best.cost, slot, first, limit, (lower, upper))
+            found += [profile] if profile else []
+        return found, self._hidden(best, found, threshold(widest, unexplained, form.sum(), 3) + 1e-30)
 
-    def _refit(self, u: np.ndarray, slot: int) -> tuple[np.ndarray, float]:
-        """Where all but one entry of the vector go from there, and the cost."""
+    def _hidden(self, best: Minimum, profiles: Sequence[Profile], limit: float) -> list[str]:
+        """Parameters of what lies below a coat that may be opaque in all channels at once: whatever they are, the images can be the same."""
+        limits = {p.slot for p in profiles if p.rise[-1] < 1.0 and p.at[-1] == self.bounds[1][p.slot]}
+        for f in self.free.free:
+            if f.field in ABSORBING and f.layer is not None and limits.issuperset(f.slots):
+                opaque = np.array(best.vector)
+                opaque[list(f.slots)] = self.bounds[1][list(f.slots)]
+                if self._refit(opaque, f.slots)[1] - best.cost < limit:
+                    return [below.name for below in self.free.free if below.layer is not None and below.layer > f.layer]
+        return []
+
+    def _refit(self, u: np.ndarray, slots: int | Sequence[int]) -> tuple[np.ndarray, float]:
+        """Where all but some entries of the vector go from there, and the cost."""
         kept = self.bounds
-        still = np.arange(len(u)) == slot
+        still = np.isin(np.arange(len(u)), slots)
         self.bounds = np.where(still, u, kept[0]), np.where(still, u, kept[1])
         steps = len(self.trace)
         reached, _ = self._descend(Minimum((0,), u, np.inf, np.eye(len(u))), self.blocks, FINE_STEPS, "profile")
@@ -188,13 +207,50 @@ class _Fit:
 
     def _weigh(self, u: np.ndarray | None) -> None:
         """Set the residual weights from the model at `u`, or equal ones before there is a model."""
-        values = self._even(self.samples) if u is None else self._weights(self._models(u, self.samples), self.metric)
+        if u is None:
+            values = self._even(self.samples)
+        else:
+            models = self._models(u, self.samples)
+            values = self._weights(models, self.metric)
+            self._give_back(models)
         weight = channels_first(self.layout.scatter(values, 0.0))
         self.brightness = [
             float(np.sum((w * compared(block.target, block.curve)).astype(float) ** 2))
             for w, block in zip(weight, self.blocks, strict=True)
         ]
         self.blocks = [_weighted(block, w) for block, w in zip(self.blocks, weight, strict=True)]
+
+    def _give_back(self, models: Sequence[np.ndarray]) -> None:
+        """Set the targets to what the references are without fireflies, but for their light: that is everywhere."""
+        self.lost = [self._lost(model, samples) for model, samples in zip(models, self.samples, strict=True)]
+        targets = [
+            samples.target if off is None else samples.target + off.mean
+            for off, samples in zip(self.lost, self.samples, strict=True)
+        ]
+        target = channels_first(self.layout.scatter(targets, 0.0))
+        self.blocks = [
+            dataclasses.replace(block, target=jax.device_put(t)) for block, t in zip(self.blocks, target, strict=True)
+        ]
+
+    def _lost(self, model: np.ndarray, samples: Samples) -> Lost | None:
+        """Light that the loss takes from fireflies, where a file says that it has any."""
+        if samples.noise is None or curve(self.metric, brightness(samples.target)):
+            return None
+        weight = inverse_sigma(model, samples.target, samples.noise, self.metric)
+        residual = (model - samples.target) * weight
+        return lost(residual, robust(residual, self.loss), weight, noise_law(np.maximum(model, 0.0), samples.noise))
+
+    def _alike(self) -> list[np.ndarray]:
+        """Errors of the weighted residuals that all pixels of a channel of a reference have together."""
+        found = []
+        for k, off in enumerate(self.lost):
+            if off is not None:
+                error = self.layout.scatter(
+                    [off.error if j == k else np.zeros_like(s.target) for j, s in enumerate(self.samples)], 0.0
+                )
+                weights = np.stack([np.asarray(block.inverse_sigma).T for block in self.blocks])
+                found += [(error * weights * one).reshape(-1, 3) for one in np.eye(3) if np.any(error * one)]
+        return found
 
     def _even(self, samples: Sequence[Samples]) -> list[np.ndarray]:
         """Weights before there is a model. A measurement has no noise to speak of, and a highlight a thousand times as bright as all else:
@@ -322,7 +378,7 @@ class _Fit:
         return [*ranked(ends, level), *(m for m in minima if not any(m is other for other in near))]
 
     def _discrepancy(
-        self, u: np.ndarray, models: Sequence[np.ndarray], jacobian: np.ndarray, gram: np.ndarray, held: np.ndarray
+        self, u: np.ndarray, models: Sequence[np.ndarray], jacobian: np.ndarray, gram: np.ndarray
     ) -> discrepancy.Discrepancy | None:
         """What the form gets wrong; None, with a note, where no random walk can tell."""
         stack = self._material(u)
@@ -334,7 +390,7 @@ class _Fit:
         slopes = self.layout.scatter([slope(m, by) for m, by in zip(models, self.curves, strict=True)], 0.0).reshape(-1, 3)
         weights = np.concatenate([np.asarray(block.inverse_sigma).T for block in self.blocks])
         return discrepancy.measure(
-            stack, self.views, self.samples, place, jacobian, slopes * weights * self._light(u), gram, held, self.seed
+            stack, self.views, self.samples, place, jacobian, slopes * weights * self._light(u), gram, self.seed
         )
 
     def _sectors(self) -> np.ndarray:

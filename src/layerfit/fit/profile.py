@@ -14,8 +14,8 @@ from .parameters import Free
 from .starts import SIGHT
 from .uncertainty import BLIND
 
-CHI2_95 = 3.841
-"""Rise of chi^2 within which the true value lies 95 times of 100 (Wilks 1938)."""
+CHI2_95 = {1: 3.841, 3: 7.815}
+"""Rise of chi^2 within which the true values of so many parameters lie 95 times of 100 (Wilks 1938)."""
 
 DEEP = 1.0
 """Optical depth from which on it is asked whether the base is seen at all."""
@@ -60,16 +60,21 @@ class Profile:
         return None
 
 
-def threshold(scatter: float, misfit: float) -> float:
+def threshold(scatter: float, misfit: float, form: float = 0.0, together: int = 1) -> float:
     """Rise of the cost that ends an interval: of noise, and of what the form gets wrong, which can turn round minima in sight of each other.
 
-    `scatter` is the variance of a weighted residual, `misfit` half the sum of squares that no noise explains.
+    `scatter` is the variance of a weighted residual, `misfit` half the sum of squares that no noise explains, `form` half that of what the form is
+    known to get wrong, where a random walk has told: materials whose images differ by less are one to this fit. `together` is the number of
+    parameters that are asked about at once.
     """
-    return 0.5 * CHI2_95 * scatter + (SIGHT - 1.0) * misfit
+    return 0.5 * CHI2_95[together] * scatter + (SIGHT - 1.0) * misfit + form
 
 
 def scatter(gram: np.ndarray, covariance: np.ndarray, slot: int) -> float:
-    """Variance of the weighted residuals that one parameter is seen by: its own over what unit variance would give it."""
+    """Variance of the weighted residuals that one parameter is seen by: its own over what unit variance would give it. 0 of one
+    that is not seen."""
+    if not np.isfinite(covariance[slot, slot]):
+        return 0.0
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     unit = np.sum(vectors[slot] ** 2 / np.maximum(values, BLIND)) / scale[slot] ** 2
@@ -95,7 +100,11 @@ def _side(
 
     def look(value: float) -> tuple[float, float]:
         nonlocal here
-        here, reached = refit(_held(here, slot, value), slot)
+        there, reached = refit(_held(here, slot, value), slot)
+        if reached - cost >= limit:  # an end is one if it is so from the minimum, too: from here the others may be far out
+            there, reached = min((there, reached), refit(_held(u, slot, value), slot), key=lambda end: end[1])
+        if reached - cost < limit:
+            here = there
         found.append((value, (reached - cost) / limit))
         return found[-1]
 

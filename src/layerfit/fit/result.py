@@ -81,6 +81,8 @@ class FitResult:
     """Weighted residual over the weighted image, without the noise that the files state."""
     profiles: list[Profile]
     """Of the parameters that were asked for, and of depths that are but lower limits."""
+    hidden: list[str]
+    """Parameters of what lies below a coat that may be opaque: whatever they are, the images can be the same."""
     samples: list[Samples]
     views: Sequence[AnyView]
     clock: Clock
@@ -119,7 +121,7 @@ def parameters(result: FitResult) -> dict[str, dict[str, Any]]:
             "start": rounded(starts[f.name]),
             "sigma": _sigma(slopes[at] * sigma[at]),
             "at_bound": "lower" if np.any(low[at]) else "upper" if np.any(high[at]) else None,
-            "identifiable": not np.any(result.uncertainty.sigma[at] >= WEAK_SIGMA),
+            "identifiable": f.name not in result.hidden and not np.any(result.uncertainty.sigma[at] >= WEAK_SIGMA),
             "unit": f.spec.unit,
         }
         if known:
@@ -128,9 +130,7 @@ def parameters(result: FitResult) -> dict[str, dict[str, Any]]:
         ends = [_interval(result, f, slot) for slot in f.slots]
         if any(ends):
             rows[f.name]["interval_95"] = ends[0] if len(ends) == 1 else ends
-            rows[f.name]["lower_limit"] = f.field in ABSORBING and any(
-                end is not None and end[1] is None and end[0] for end in ends
-            )
+            rows[f.name]["lower_limit"] = f.field in ABSORBING and any(_is_lower_limit(end) for end in ends)
     for layer in result.stack.layers:
         if getattr(layer, "absorption_per_mm", None) is not None:
             rows[f"{layer.name}.tau"] = _derived_tau(result, layer)
@@ -145,6 +145,10 @@ def _interval(result: FitResult, f: Free, slot: int) -> list[float | None] | Non
     return [None if end is None else float(f"{float(f.from_steps(end, np)):.4g}") for end in profile.interval]
 
 
+def _is_lower_limit(ends: list[float | None] | None) -> bool:
+    return ends is not None and ends[1] is None and bool(ends[0])
+
+
 def _at_bounds(result: FitResult) -> tuple[np.ndarray, np.ndarray]:
     """Which entries of the vector stand at the lower and at the upper end of their range."""
     lower, upper = result.free.bounds()
@@ -153,9 +157,13 @@ def _at_bounds(result: FitResult) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _sigmas(result: FitResult) -> np.ndarray:
-    """Sigmas in the coordinates of the fit; NaN at a bound, where the data pull one way only and nothing tells how far."""
-    total = np.sqrt(sum(part**2 for part in _sigma_parts(result).values()))
-    return np.where(np.logical_or(*_at_bounds(result)), np.nan, total)
+    """Sigmas in the coordinates of the fit; at a bound, how far inside the truth may be. NaN for what is but a limit, and what that hides."""
+    sigma = np.sqrt(sum(part**2 for part in _sigma_parts(result).values()))
+    for f in result.free.free:
+        for slot in f.slots:
+            if f.name in result.hidden or (f.field in ABSORBING and _is_lower_limit(_interval(result, f, slot))):
+                sigma[slot] = np.nan
+    return sigma
 
 
 def _sigma_parts(result: FitResult) -> dict[str, np.ndarray]:
@@ -169,6 +177,8 @@ def _sigma_parts(result: FitResult) -> dict[str, np.ndarray]:
 def _corrected(result: FitResult) -> np.ndarray:
     """The vector that an exact form would have been fitted with, inside the bounds."""
     step = np.zeros_like(result.vector) if result.discrepancy is None else result.discrepancy.step
+    if np.any(_at_bounds(result)):
+        step = step + result.uncertainty.outside
     return np.clip(result.vector + step, *result.free.bounds())
 
 
@@ -180,13 +190,13 @@ def _sigma(values: np.ndarray) -> Any:
 def _derived_tau(result: FitResult, layer: Any) -> dict[str, Any]:
     """tau = absorption thickness, with the sigma of whichever is fitted."""
     tau = np.broadcast_to(np.asarray(layer.optical_depth, float), 3)
-    relative = np.zeros(3)
+    sigma = np.zeros(3)
     slopes = result.free.slopes(result.vector) * _sigmas(result)
-    values = result.free.values(result.vector)
+    other = {"absorption_per_mm": layer.thickness_um, "thickness_um": layer.absorption_per_mm}
     for f in result.free.free:
-        if f.name in (f"{layer.name}.absorption_per_mm", f"{layer.name}.thickness_um"):
-            relative = np.hypot(relative, slopes[list(f.slots)] / np.maximum(np.abs(values[f.name]), 1e-12))
-    return {"value": rounded(tau), "sigma": _sigma(relative * tau), "derived": "absorption_per_mm * thickness_um"}
+        if f.name.startswith(f"{layer.name}.") and f.field in other:
+            sigma = np.hypot(sigma, 1e-3 * slopes[list(f.slots)] * np.asarray(other[f.field], float))
+    return {"value": rounded(tau), "sigma": _sigma(sigma), "derived": "absorption_per_mm * thickness_um"}
 
 
 def correlations(result: FitResult) -> list[list[Any]]:

@@ -1,6 +1,7 @@
 """What the data determine: sigmas, correlations, and the directions in which the parameters can move without being seen."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -27,6 +28,8 @@ class Uncertainty:
     covariance: np.ndarray
     blind: list[np.ndarray]
     """Unit directions of parameters (scaled to equal effect) that the data do not see."""
+    outside: np.ndarray
+    """Step to where the minimum would be without bounds; 0 but where a value stands at one."""
 
     @property
     def sigma(self) -> np.ndarray:
@@ -38,24 +41,30 @@ class Uncertainty:
         return self.covariance / scale[:, None] / scale[None, :]
 
 
-def estimate(gram: np.ndarray, held: np.ndarray, jacobian: np.ndarray, residual: np.ndarray, part: np.ndarray) -> Uncertainty:
-    """Covariance of the parameters that are not held on a bound.
+def estimate(
+    gram: np.ndarray, jacobian: np.ndarray, residual: np.ndarray, part: np.ndarray, alike: Sequence[np.ndarray] = ()
+) -> Uncertainty:
+    """Covariance of the parameters, as if there were no bounds.
+
+    A value that stands at its bound is not known to be there: noise has pushed it out, and the truth is somewhere inside. Taken as known, it
+    would lend its partners a certainty that nobody has.
 
     `jacobian` (pixels, channels, parameters) and `residual` (pixels, channels) are weighted; pixels that do not count have `part` -1. The
     gradients of the pixels scatter as their errors do, whatever the weights expected: the sum of their products, between two
     inverses of J^T J (Huber 1967; White 1980), over the degrees of freedom. By pixels, not by residuals: errors of the channels of one
     pixel are of the same light paths, and alike. That takes pixels as independent. Systematic misfit, which a closed form always has, is
     alike in neighbours, and pulls parts of the image apart: a jackknife over the parts, `part` (pixels,) of `GROUPS`, one Newton
-    step each, widens what it finds to be wider than chance makes it.
+    step each, widens what it finds to be wider than chance makes it. `alike` are errors of the residuals (pixels, channels)
+    that all pixels have together, one standard deviation of each.
     """
     gradients = np.einsum("pci,pc->pi", jacobian, residual)
     scatter = gradients.T @ gradients
     residuals = int(np.sum(part >= 0)) * residual.shape[1]
     groups = [_normal(jacobian[part == k], gradients[part == k]) for k in range(GROUPS)]
     n = len(gram)
-    free = np.flatnonzero(~held)
+    free = np.arange(n)
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    usable = free[scale[free] > 1e-12 * scale.max()] if n else free
+    usable = free[scale > 1e-12 * scale.max()] if n else free
     covariance = np.zeros((n, n))
     blind: list[np.ndarray] = []
     for i in np.setdiff1d(free, usable):
@@ -71,12 +80,15 @@ def estimate(gram: np.ndarray, held: np.ndarray, jacobian: np.ndarray, residual:
             blind.append(full)
         freedom = residuals / max(residuals - len(usable), 1)
         spread = freedom * _sandwich(values, vectors, scatter[at] / unit) / unit
-        moves = np.array([newton(gram - part_gram, held, part)[usable] for part, part_gram in groups])
+        moves = np.array([newton(gram - part_gram, part)[usable] for part, part_gram in groups])
         apart = (len(groups) - 1) / max(len(groups), 1) * np.sum((moves - moves.mean(0)) ** 2, 0)
         ratio = apart / np.maximum(np.diag(spread), 1e-300)
         factor = np.sqrt(np.maximum(ratio - (CHANCE - 1.0), 1.0))
         covariance[at] = spread * np.outer(factor, factor)
-    return Uncertainty(covariance, blind)
+    for error in alike:
+        step = newton(gram, np.einsum("pci,pc->i", jacobian, error))
+        covariance += np.outer(step, step)
+    return Uncertainty(covariance, blind, -newton(gram, gradients.sum(0)))
 
 
 def _normal(jacobian: np.ndarray, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -97,10 +109,10 @@ def _sandwich(values: np.ndarray, vectors: np.ndarray, scatter: np.ndarray) -> n
     return inverse @ inside @ inverse.T
 
 
-def newton(gram: np.ndarray, held: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """(J^T J)^-1 times gradients (..., parameters), along what the data see; parameters that are `held` stay."""
+def newton(gram: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """(J^T J)^-1 times gradients (..., parameters), along what the data see."""
     diagonal = np.diag(gram)
-    still = held | (diagonal <= 1e-24 * diagonal.max())
+    still = diagonal <= 1e-24 * diagonal.max()
     scale = np.where(still, 0.0, 1.0 / np.sqrt(np.where(still, 1.0, diagonal)))
     values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
     seen = values >= BLIND

@@ -5,6 +5,7 @@ so that weights made from it, and robust losses on it, pull the fit down. The la
 standard errors where it has them; a share of the value, for what no closed form gets right; and a share of the image's brightness.
 """
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -75,12 +76,39 @@ def robust(residual: np.ndarray, loss: str) -> np.ndarray:
     return (1.0 / np.sqrt(1.0 + (size / 2.385) ** 2)).astype(np.float32)
 
 
+@dataclasses.dataclass(frozen=True)
+class Lost:
+    """Light that a cap takes from fireflies, as it is missing from every pixel; both (pixels, 3) radiances."""
+
+    mean: np.ndarray
+    error: np.ndarray
+    """Standard error: one number a channel, alike in all pixels."""
+
+
+def lost(residual: np.ndarray, factor: np.ndarray, weight: np.ndarray, law: np.ndarray) -> Lost:
+    """What a robust loss takes from an image (pixels, 3), by its noise `law`; `residual` is weighted, `factor` as `robust` gives it.
+
+    A path tracer's noise is skewed: the few pixels that are far too bright make up for the many that are a little too dark. Capped and
+    nothing else, an image has lost that light, and a coat seems more absorbing than it is. So it is given back, to each pixel by the noise that is
+    expected of it. Few fireflies tell little of those that there should be: of the mean counts the part that is
+    more than chance (James and Stein 1961), nothing of one firefly, half of two alike.
+    """
+    excess = residual * (factor**2 - 1.0)
+    expected = np.maximum((law * weight).sum(0), 1e-30)
+    total, squares = excess.sum(0), (excess**2).sum(0)
+    sure = np.maximum(1.0 - squares / np.maximum(total**2, 1e-30), 0.0)
+    return Lost(law * (sure * total / expected), law * (np.sqrt(sure * squares) / expected))
+
+
 def misfit(models: Sequence[np.ndarray], samples: Sequence[Samples], weights: Sequence[np.ndarray]) -> float:
-    """Weighted residual over the weighted image, roots of sums of squares, without the noise that the files state."""
+    """Weighted residual over the weighted image, roots of sums of squares, without the noise that the files state.
+
+    The noise of each pixel as its file has it, where weights take a law: a sum over the image needs the fireflies, which no law knows.
+    """
     residual = noise = image = 0.0
     for model, seen, weight in zip(models, samples, weights, strict=True):
         residual += np.sum(((model - seen.target) * weight).astype(float) ** 2)
         image += np.sum((seen.target * weight).astype(float) ** 2)
         if seen.noise is not None:
-            noise += np.sum((noise_law(np.maximum(model, 0.0), seen.noise) * weight).astype(float) ** 2)
+            noise += np.sum((np.nan_to_num(seen.noise, posinf=0.0) * weight).astype(float) ** 2)
     return float(np.sqrt(max(residual - noise, 0.0) / image))
