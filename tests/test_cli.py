@@ -22,7 +22,21 @@ from layerfit.capture.exr import read_exr
 from layerfit.preset import read_preset
 from layerfit.render import brdf
 
-COMMANDS = ("fit", "structures", "advise", "render", "eval", "export", "verify", "truth", "presets", "metal", "inspect", "demo")
+COMMANDS = (
+    "fit",
+    "structures",
+    "advise",
+    "render",
+    "eval",
+    "export",
+    "verify",
+    "truth",
+    "tradeoff",
+    "presets",
+    "metal",
+    "inspect",
+    "demo",
+)
 
 CONSTANT_LIGHT = """\
 [[light]]

@@ -18,7 +18,7 @@ from layerfit.preset import read_preset
 from layerfit.report.truth import sentence
 from layerfit.stack import Stack
 from layerfit.surfaces import Lambert
-from layerfit.truth import NOISE, _hemisphere, below, compare, forms_of, noise, relative_error
+from layerfit.truth import NOISE, below, compare, forms_of, hemisphere, noise, relative_error
 from layerfit.walk import Estimate
 
 EXACT = 0.02
@@ -63,7 +63,7 @@ def test_numbers_depend_on_the_seed_alone():
 
 def test_noise_is_the_error_of_an_exact_form():
     """Of normal values about the truth, in the measure of the errors."""
-    fan = _hemisphere(40.0)
+    fan = hemisphere(40.0)
     rng = np.random.default_rng(1)
     f = rng.uniform(0.5, 1.5, (len(fan.wo), 3))
     se = 0.01 * f
@@ -81,7 +81,7 @@ def test_black_channels_have_no_error():
 
 def test_the_light_from_below_holds_no_top_lobe():
     black = Stack(GLOSSY.layers, Lambert(albedo=0.0))
-    assert np.max(np.abs(below(black, [_hemisphere(20.0)])[0])) < 1e-9
+    assert np.max(np.abs(below(black, [hemisphere(20.0)])[0])) < 1e-9
 
 
 @pytest.mark.parametrize("interface", ["single", "multi"])

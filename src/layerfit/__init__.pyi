@@ -55,5 +55,6 @@ from .surfaces import (
     Phong as Phong,
     TorranceSparrow as TorranceSparrow,
 )
+from .tradeoffs import tradeoff as tradeoff
 
 __version__: str

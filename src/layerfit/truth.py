@@ -74,17 +74,17 @@ def compare(
     """
     if interface is None:
         interface = interface_of(stack)
-    _check(stack, name, interface)
+    check(stack, name, interface)
     forms = forms_of(stack, interface)
-    hemispheres, planes = [_hemisphere(a) for a in INCIDENCE_DEG], [_plane(a) for a in PLANE_DEG]
+    hemispheres, planes = [hemisphere(a) for a in INCIDENCE_DEG], [_plane(a) for a in PLANE_DEG]
     fans = [*hemispheres, *planes]
-    counts = _counts(stack, hemispheres, interface, paths, seed, progress)
+    counts = path_counts(stack, hemispheres, interface, paths, seed, progress)
     counts += [max(counts[INCIDENCE_DEG.index(a)] // PLANE_SHARE, PILOT) for a in PLANE_DEG]
     work = np.cumsum([0, *(count * len(fan.wo) for count, fan in zip(counts, fans, strict=True))])
     walks = []
     for k, (fan, count) in enumerate(zip(fans, counts, strict=True)):
         progress("walk", work[k] / work[-1])
-        walks.append(_walk(stack, fan, count, interface, seed))
+        walks.append(walked(stack, fan, count, interface, seed))
     values = {}
     for key, form in forms.items():
         progress(key, 1.0)
@@ -104,7 +104,7 @@ def compare(
         "seed": seed,
         "incidence_deg": list(INCIDENCE_DEG),
         "paths": counts[:measured],
-        "noise_rel": [_mean(noise(truth, fan)) for fan, truth in truths],
+        "noise_rel": [mean_of(noise(truth, fan)) for fan, truth in truths],
         "forms": {key: _summary(rows) for key, rows in errors.items()},
         "planes": [
             {
@@ -136,7 +136,8 @@ def truth_of_preset(stack: Stack, name: str, directory: Path, **options: Any) ->
     return document
 
 
-def _check(stack: Stack, name: str, interface: str) -> None:
+def check(stack: Stack, name: str, interface: str) -> None:
+    """Raise `InputError` for a material that cannot be compared with the walk."""
     if interface not in ("single", "multi"):
         raise InputError(f"--interface {interface}: should be single or multi{nearest(interface, ('single', 'multi'))}")
     if not stack.layers:
@@ -154,14 +155,14 @@ def forms_of(stack: Stack, interface: str) -> dict[str, Any]:
     return forms
 
 
-def below(stack: Stack, fans: Sequence[Fan]) -> list[np.ndarray]:
-    """BRDF (n, 3) [1/sr] from below the coats in the form of the stack, for every fan."""
+def below(stack: Stack, fans: Sequence[Fan], of: Stack | None = None) -> list[np.ndarray]:
+    """BRDF (n, 3) [1/sr] from below the coats in the form of the stack, for every fan; the lobe that is taken off is `of` another, where given."""
     wi = np.concatenate([np.broadcast_to(fan.wi, fan.wo.shape) for fan in fans])
     wo = np.concatenate([fan.wo for fan in fans])
     # The lobe that is taken off may be 1e5 times what is left of it: too much for the digits of float32.
     with jax.enable_x64(True):
         whole = np.asarray(jax.jit(brdf)(stack.astype(np.float64), wi, wo))
-        top = np.concatenate([top_lobe(stack, fan.wi, fan.wo) for fan in fans])
+        top = np.concatenate([top_lobe(of or stack, fan.wi, fan.wo) for fan in fans])
     return np.split(whole - top, np.cumsum([len(fan.wo) for fan in fans])[:-1])
 
 
@@ -182,11 +183,14 @@ def _relative(difference: np.ndarray, truth: Estimate, fan: Fan) -> np.ndarray:
     return np.where(seen, np.sum(difference * cosine, 0) / np.where(seen, light, 1.0), np.nan)
 
 
-def _walk(stack: Stack, fan: Fan, paths: int, interface: Any, seed: int) -> Estimate:
+def walked(stack: Stack, fan: Fan, paths: int, interface: Any, seed: int) -> Estimate:
+    """The walk through a material for one fan."""
     return walk(stack, fan.wi, fan.wo, paths=paths, seed=seed, interface=interface, haze=hazes(stack))
 
 
-def _counts(stack: Stack, fans: Sequence[Fan], interface: str, paths: int | None, seed: int, progress: Progress) -> list[int]:
+def path_counts(
+    stack: Stack, fans: Sequence[Fan], interface: str, paths: int | None, seed: int, progress: Progress
+) -> list[int]:
     """Paths of every fan, from the noise of a few: so the numbers do not depend on how fast a machine is."""
     if paths is not None:
         return [paths] * len(fans)
@@ -194,7 +198,7 @@ def _counts(stack: Stack, fans: Sequence[Fan], interface: str, paths: int | None
     for k, fan in enumerate(fans):
         progress("pilot", k / len(fans))
         # Another seed, or the noise that chose the paths would be part of the result.
-        pilot = _mean(noise(_walk(stack, fan, PILOT, interface, seed + 1), fan))
+        pilot = mean_of(noise(walked(stack, fan, PILOT, interface, seed + 1), fan))
         wanted = 0.0 if math.isnan(pilot) else PILOT * (pilot / NOISE) ** 2
         counts.append(int(np.clip(math.ceil(wanted), PILOT, MOST)))
     return counts
@@ -203,19 +207,19 @@ def _counts(stack: Stack, fans: Sequence[Fan], interface: str, paths: int | None
 def _summary(errors: Sequence[np.ndarray]) -> dict[str, Any]:
     table = np.array(errors)
     return {
-        "error_rel": [_mean(row) for row in table],
+        "error_rel": [mean_of(row) for row in table],
         "error_rel_rgb": table.tolist(),
         "median": float(np.nanmedian(table)),
         "p90": float(np.nanquantile(table, 0.9)),
     }
 
 
-def _mean(values: np.ndarray) -> float:
+def mean_of(values: np.ndarray) -> float:
     """Over the channels that are not black."""
     return math.nan if np.all(np.isnan(values)) else float(np.nanmean(values))
 
 
-def _hemisphere(incidence_deg: float) -> Fan:
+def hemisphere(incidence_deg: float) -> Fan:
     """About forty views: evenly over one side of the plane of incidence, as the other is its image, and around the mirror direction."""
     evenly = [(theta, phi) for theta in (10.0, 25.0, 40.0, 55.0, 70.0) for phi in (0.0, 45.0, 90.0, 135.0, 180.0)]
     views = [_direction(theta, phi) for theta, phi in evenly]

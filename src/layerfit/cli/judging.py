@@ -1,4 +1,4 @@
-"""Commands that judge a material: `truth` compares its closed forms with the random walk."""
+"""Commands that judge a material: `truth` compares its closed forms with the random walk, `tradeoff` what accuracy costs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -43,3 +43,43 @@ def truth(
     if as_json:
         emit(document)
     raise typer.Exit(0 if document["trusted"] else 1)
+
+
+@app.command()
+def tradeoff(
+    preset: Preset,
+    scene: Annotated[
+        Path | None, typer.Argument(help="Scene file: errors are seen on its pixels, and fits are to its references.")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    lights: Annotated[int, typer.Option(min=1, max=8, help="Lights under which shaders are timed.")] = 1,
+    rounds: Annotated[int, typer.Option(min=3, help="Rounds in which all shaders, and Phong, are timed.")] = 30,
+    paths: Annotated[
+        int | None,
+        typer.Option(min=100, max=10_000_000, help="Paths of the random walk for every pair; left out, for 0.5 % noise."),
+    ] = None,
+    fits: Annotated[bool, typer.Option("--fits/--no-fits", help="Whether fits are timed too: minutes.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Measure error against run time: of the shaders that a material can have, against itself and the random walk; and of its fit.
+
+    Leaves `tradeoff.json`, `tradeoff.csv`, `tradeoff.png` and `tradeoff.html` in the output directory. Interrupted, it
+    goes on from there when it is asked again.
+
+    Example: `layerfit tradeoff lacquered_copper -o out/copper`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..report.tradeoff import tables
+    from ..tradeoffs import tradeoff as measure
+
+    with progress() as report:
+        document = measure(preset, scene, output, lights=lights, rounds=rounds, paths=paths, fit=fits, progress=report)
+    for table in tables(document):
+        stderr.print(table)
+    for sentence in document["in_words"]:
+        say(sentence)
+    say(f"Wrote tradeoff.html, tradeoff.png, tradeoff.csv and tradeoff.json in {output}/")
+    if as_json:
+        emit(document)

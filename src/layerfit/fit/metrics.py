@@ -12,7 +12,6 @@ def image_error(image: np.ndarray, reference: np.ndarray, covered: np.ndarray) -
     percentile of the reference is white, sRGB-encoded and clipped; PSNR [dB] and SSIM of the encoded images, and the mean
     CIEDE2000 difference (Sharma et al. 2005).
     """
-    from skimage.color import deltaE_ciede2000, rgb2lab
     from skimage.metrics import structural_similarity
 
     a, b = image[covered], reference[covered]
@@ -21,13 +20,19 @@ def image_error(image: np.ndarray, reference: np.ndarray, covered: np.ndarray) -
     shown, wanted = (np.where(covered[..., None], display(x, white), 0.0) for x in (image, reference))
     error = np.mean((shown[covered] - wanted[covered]) ** 2)
     similarity: Any = structural_similarity(wanted, shown, channel_axis=-1, data_range=1.0, full=True)
-    delta_e = deltaE_ciede2000(rgb2lab(wanted[covered]), rgb2lab(shown[covered]))
     return {
         "rel_l2": rel_l2,
         "psnr_db": float(10.0 * np.log10(1.0 / np.maximum(error, 1e-12))),
         "ssim": float(np.mean(similarity[1][covered])),
-        "delta_e": float(np.mean(delta_e)),
+        "delta_e": float(np.mean(delta_e(a, b, white))),
     }
+
+
+def delta_e(image: np.ndarray, reference: np.ndarray, white: float) -> np.ndarray:
+    """CIEDE2000 difference (n,) of linear RGB pixels (n, 3) that are shown with `white` at 1."""
+    from skimage.color import deltaE_ciede2000, rgb2lab
+
+    return deltaE_ciede2000(rgb2lab(display(reference, white)), rgb2lab(display(image, white)))
 
 
 def exposure(reference: np.ndarray, covered: np.ndarray) -> float:

@@ -100,7 +100,7 @@ def step(
     u: Any, state: Any, bounds: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation, solver: Any
 ) -> tuple[Any, Any]:
     """One step of the solver from `u` over some blocks of pixels: the new point and the new state."""
-    trial = np.asarray(state.y_eval).astype(np.float32)
+    trial = np.asarray(state.y_eval).astype(blocks[0].wi.dtype)
     # All are started before the first is waited for: what cores there are work side by side.
     started = _started(trial, start, blocks, free)
     total = np.sum([products(part) for part in started], 0)
@@ -111,7 +111,7 @@ def step(
 def rows(u: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian (pixels, channels, parameters) and residuals (pixels, channels) at `u`, weighted; the pixels block by block."""
     slots = tuple(f.slots for f in free.free)
-    parts = [dense(part, slots) for part in _started(np.asarray(u).astype(np.float32), start, blocks, free)]
+    parts = [dense(part, slots) for part in _started(np.asarray(u).astype(blocks[0].wi.dtype), start, blocks, free)]
     jacobian, residual = zip(*parts, strict=True)
     return np.concatenate(jacobian), np.concatenate(residual)
 

@@ -8,7 +8,7 @@ from typing import Any
 from ..fit import words
 from .text import image_error, lines, relative
 
-_STYLE = """
+STYLE = """
 :root { color-scheme: light dark; --ink: #18181b; --paper: #fafafa; --line: #d4d4d8; --soft: #71717a; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e4e4e7; --paper: #18181b; --line: #3f3f46; --soft: #a1a1aa; } }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 64rem; margin: 2rem auto; padding: 0 1rem; }
@@ -19,6 +19,12 @@ td:nth-child(n+2) { font-variant-numeric: tabular-nums; } pre { overflow-x: auto
 """
 
 
+_STRIP = """All at one exposure: the 99th percentile of the reference is white. The difference is that of the shader from the
+reference, where pixels are compared."""
+_CONVERGENCE = "One line a start. Coarse and polish use few pixels, fine all of them with weights that follow the model."
+_PLANES = "In the plane of incidence; the mirror side is positive."
+
+
 def page(
     name: str, document: Mapping[str, Any], picture: bytes, convergence: bytes, shader: str, planes: bytes | None = None
 ) -> str:
@@ -26,28 +32,26 @@ def page(
     text = html.escape("\n".join(lines(document)))
     return f"""<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>{html.escape(name)}: fit</title><style>{_STYLE}</style>
+<title>{html.escape(name)}: fit</title><style>{STYLE}</style>
 <h1>{html.escape(name)}</h1>
 <p>{html.escape(_verdict(document))}</p>
-<figure><img alt="reference, fit, shader and difference side by side" src="data:image/png;base64,{base64.b64encode(picture).decode()}">
-<figcaption class=soft>All at one exposure: the 99th percentile of the reference is white. The difference is that of the shader from the
-reference, where pixels are compared.</figcaption></figure>
-{"" if planes is None else _planes(planes)}
+{figure(picture, "reference, fit, shader and difference side by side", _STRIP)}
+{"" if planes is None else figure(planes, "measured values and the fit in planes of incidence", _PLANES)}
 <h2>Parameters</h2>
 {words.table(document["parameters"])}
 <p class=soft>Sigmas are {html.escape(document["sigma_is"])}.</p>
 <h2>Error against run time</h2>
-<figure><img alt="error of the fit against seconds" src="data:image/png;base64,{base64.b64encode(convergence).decode()}">
-<figcaption class=soft>One line a start. Coarse and polish use few pixels, fine all of them with weights that follow the model.</figcaption></figure>
+{figure(convergence, "error of the fit against seconds", _CONVERGENCE)}
 <h2>Report</h2><pre>{text}</pre>
 <details><summary>Shader</summary><pre>{html.escape(shader)}</pre></details>
 </html>
 """
 
 
-def _planes(picture: bytes) -> str:
-    return f"""<figure><img alt="measured values and the fit in planes of incidence" src="data:image/png;base64,{base64.b64encode(picture).decode()}">
-<figcaption class=soft>In the plane of incidence; the mirror side is positive.</figcaption></figure>"""
+def figure(picture: bytes, alt: str, caption: str) -> str:
+    """A PNG inside the page, with words below."""
+    encoded = base64.b64encode(picture).decode()
+    return f'<figure><img alt="{alt}" src="data:image/png;base64,{encoded}">\n<figcaption class=soft>{caption}</figcaption></figure>'
 
 
 def _verdict(document: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from ..fit.result import POOR, flags, parameters
 from ..fit.structures import NO_BOUNDARY, STRONG, StructureChoice, Tried
 from .pictures import BACKGROUND, INK, LINE, png
+from .scatter import free_place
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -155,15 +156,6 @@ def pareto(choice: StructureChoice) -> bytes:
         draw.ellipse([x - r, y - r, x + r, y + r], fill=_COATED if t.layers else _BARE)
         if t is choice.chosen:
             draw.ellipse([x - 2 * r, y - 2 * r, x + 2 * r, y + 2 * r], outline=INK, width=_SCALE)
-        at = x + 2.4 * r, y
-        box = draw.textbbox(at, t.candidate.name, font=font, anchor="lm")
-        while any(_overlap(box, other) for other in boxes):
-            at = at[0], at[1] + 2.0 * _SCALE
-            box = draw.textbbox(at, t.candidate.name, font=font, anchor="lm")
-        boxes.append(box)
+        at = free_place(draw, (x + 2.4 * r, y), t.candidate.name, font, boxes, 2.0 * _SCALE)
         draw.text(at, t.candidate.name, fill=INK, font=font, anchor="lm")
     return png(canvas.reduce(_SCALE))
-
-
-def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

@@ -1,6 +1,8 @@
 """A sphere of a measured BRDF, to look at: values between the samples, where there are samples near enough."""
 
 import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
@@ -25,13 +27,22 @@ REACH = 3.0
 
 def sphere_of(view: MeasuredView) -> View:
     """The sphere under one distant light, as a reference render of `SIDE` pixels. Pixels far from all samples are not covered."""
+    seen = bare_sphere(view.reference.path, SIDE, view.reference.thickness_scale)
+    samples = seen.samples()
+    f, near = interpolated(view.brdf, samples.wi[:, 0].astype(float), samples.wo.astype(float))
+    target = np.where(near[:, None], f * samples.weight[:, 0], 0.0)
+    return dataclasses.replace(seen, target=target, picture=seen.image(target)).some(near)
+
+
+def bare_sphere(path: Path, side: int, thickness_scale: Mapping[str, float] | None = None) -> View:
+    """A sphere under one distant light as if a file held it: what is lit of `side` x `side` pixels, to be given its target."""
     camera = Camera((0.0, 0.0, DISTANCE), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), float(2.0 * np.degrees(np.arctan(1.04 / DISTANCE))))
     light = Directional(tuple(normalise(np.array(TO_LIGHT)).tolist()), (np.pi, np.pi, np.pi))
-    surface = sphere_surface(Sphere(), camera, SIDE, SIDE)
+    surface = sphere_surface(Sphere(), camera, side, side)
     index = np.flatnonzero(surface.covered & (surface.normal @ light.to_light > 0.0))
     position, normal = (a.reshape(-1, 3)[index] for a in (surface.position, surface.normal))
-    seen = View(
-        reference=Reference(view.reference.path, camera, (light,), Sphere(), {}, None, view.reference.thickness_scale),
+    return View(
+        reference=Reference(path, camera, (light,), Sphere(), {}, None, thickness_scale or {}),
         target=np.zeros((len(index), 3)),
         noise=None,
         position=position,
@@ -40,14 +51,10 @@ def sphere_of(view: MeasuredView) -> View:
         uv=sphere_uv(normal, camera.up),
         view=normalise(np.asarray(camera.position) - position),
         index=index,
-        shape=(SIDE, SIDE),
+        shape=(side, side),
         dropped={},
-        picture=np.zeros((SIDE, SIDE, 3)),
+        picture=np.zeros((side, side, 3)),
     )
-    samples = seen.samples()
-    f, near = interpolated(view.brdf, samples.wi[:, 0].astype(float), samples.wo.astype(float))
-    target = np.where(near[:, None], f * samples.weight[:, 0], 0.0)
-    return dataclasses.replace(seen, target=target, picture=seen.image(target)).some(near)
 
 
 def interpolated(brdf: MeasuredBrdf, wi: np.ndarray, wo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,1 @@
+"""Studies of a material: what accuracy costs, in its shader and in its fit."""
