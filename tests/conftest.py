@@ -34,7 +34,10 @@ if importlib.util.find_spec("beartype"):
     source_info_util.register_exclusion(os.path.dirname(jaxtyping.__file__))
 
 
-MOST_MEMORY = 2.0e9
+# Traces make objects by the million, few of them rubbish.
+gc.set_threshold(50_000, 20, 20)
+
+MOST_MEMORY = 3.0e9
 """Bytes in memory above which what JAX keeps compiled is thrown away: a whole run would keep 6 GB."""
 
 
