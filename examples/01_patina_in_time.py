@@ -14,7 +14,7 @@ from PIL import Image
 import layerfit as lf
 
 YEARS = (0, 2, 5, 10, 20, 50, 100)
-SIDE = 128
+SIDE = 96
 SUN = np.array([0.5, 0.6, 0.62])
 
 
@@ -33,7 +33,7 @@ def frames(normal: np.ndarray) -> np.ndarray:
     return np.stack([tangent, np.cross(normal, tangent), normal], 1)
 
 
-def sky(count: int = 128) -> tuple[np.ndarray, np.ndarray]:
+def sky(count: int = 64) -> tuple[np.ndarray, np.ndarray]:
     """Directions of light (count, 3) and what each brings: an even spiral over the sphere, bright above, and a sun."""
     z = 1.0 - (np.arange(count) + 0.5) * 2.0 / count
     turn = np.arange(count) * np.pi * (3.0 - np.sqrt(5.0))

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     import moderngl
 
 # Tests compile much and compute little. What computes much, the fit and the walk, is compiled as its users have it.
-_FLAGS = ["--xla_backend_optimization_level=0", *(f"--{name}=false" for name in fusion_emitters(newer=False))]
+_FLAGS = ["--xla_backend_optimization_level=0", "--xla_disable_hlo_passes=call-inliner"]
+_FLAGS += [f"--{name}=false" for name in fusion_emitters(newer=False)]
 os.environ.setdefault("XLA_FLAGS", " ".join(_FLAGS))
 
 REPOSITORY = Path(__file__).parents[1]
