@@ -7,7 +7,7 @@ UPGRADE ?=
 LOCK := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --annotation-style line
 
 .DEFAULT_GOAL := help
-.PHONY: demo test run dev lint pytest wheel format gallery lock clean help
+.PHONY: demo test run dev lint pytest wheel format docs gallery lock clean help
 
 demo: run  ## fit a layered material to a render and print a verified shader, into out/demo
 	$(BIN)/layerfit demo -o out/demo
@@ -37,6 +37,9 @@ wheel: dev  ## build the wheel and run the tests marked `wheel` on it, away from
 format: dev  ## put the sources in form
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: dev  ## the documentation as a site in out/site; every link in it leads somewhere
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 gallery: dev  ## print and draw what ships: the shaders and pictures beside the presets, and docs/gallery.md
 	$(BIN)/python tools/gallery.py
