@@ -41,6 +41,9 @@ START = Stack(
     (Coat(alpha=0.3, eta=1.35, tau=[0.3, 0.3, 0.3], **SEPARABLE),), Conductor(alpha=0.4, **COPPER, **SEPARABLE), Corrected()
 )
 NAMES = ("coat.alpha", "coat.eta", "coat.tau", "base.alpha")
+REST_S = 0.2
+"""Before each run: the threads of the other's linear algebra look for work a while longer, on the cores of the next."""
+
 CAMERA = Camera((0.8, 0.6, 4.9), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0)
 TO_LIGHT = np.array([0.46175709, 0.55410852, 0.69263564])
 
@@ -121,6 +124,7 @@ def main() -> None:
         seconds: dict[str, list[float]] = {name: [] for name in fits}
         for _ in range(arguments.runs):
             for name, peer in fits.items():
+                time.sleep(REST_S)
                 start = time.perf_counter()
                 peer.fit()
                 seconds[name].append(time.perf_counter() - start)

@@ -8,6 +8,7 @@ operation clamped to the domain, which is what a shader needs; its derivative is
 
 import dataclasses
 import json
+import operator
 from collections.abc import Callable
 from functools import partial
 from typing import Any, TypeVar, cast, dataclass_transform
@@ -42,6 +43,11 @@ def member(comment: str) -> Any:
     return dataclasses.field(metadata={"comment": comment})
 
 
+def _getter(names: list[str]) -> Callable[[Any], tuple[Any, ...]]:
+    """Of several attributes at once: a fit flattens a material thousands of times a second."""
+    return operator.attrgetter(*names) if len(names) > 1 else lambda x: tuple(getattr(x, name) for name in names)
+
+
 @dataclass_transform(frozen_default=True, field_specifiers=(static, member, dataclasses.field))
 def struct(cls: type[T]) -> type[T]:
     """A frozen dataclass that JAX maps over: fields made by `static` are structure, all others are leaves."""
@@ -50,9 +56,10 @@ def struct(cls: type[T]) -> type[T]:
     meta = [f.name for f in fields if f.metadata.get("static")]
     data = [f.name for f in fields if f.name not in meta]
     keys = [jax.tree_util.GetAttrKey(name) for name in data]
+    data_of, meta_of = _getter(data), _getter(meta)
 
-    def flatten(x: Any) -> tuple[list[Any], tuple[Any, ...]]:
-        return [getattr(x, name) for name in data], tuple(getattr(x, name) for name in meta)
+    def flatten(x: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        return data_of(x), meta_of(x)
 
     def with_keys(x: Any) -> Any:
         leaves, aux = flatten(x)

@@ -87,23 +87,26 @@ class Compiled:
 
     def begin(self, *args: Any, **static: Any) -> Any:
         """Trace a call and have it compiled while other work goes on. Arguments and result are arrays or their shapes."""
-        return self._entry(args, static)[1]
+        return self._entry(*jax.tree.flatten(args), static)[1]
+
+    def __call__(self, *args: Any, **static: Any) -> Any:
+        leaves, structure = jax.tree.flatten(args)
+        return self._ready(leaves, structure, static)(*leaves)
 
     def ready(self, *args: Any, **static: Any) -> Any:
         """The executable of a call, when it is compiled: a function of the leaves of the arguments."""
-        executable = self._entry(args, static)[0]
+        return self._ready(*jax.tree.flatten(args), static)
+
+    def _ready(self, leaves: list[Any], structure: Any, static: dict[str, Any]) -> Any:
+        executable = self._entry(leaves, structure, static)[0]
         if not executable.done():
             start = time.perf_counter()
             executable.result()
             CLOCK.compile_s += time.perf_counter() - start
         return executable.result()
 
-    def __call__(self, *args: Any, **static: Any) -> Any:
-        return self.ready(*args, **static)(*jax.tree.leaves(args))
-
-    def _entry(self, args: Any, static: dict[str, Any]) -> tuple[Future[Any], Any]:
-        leaves, structure = jax.tree.flatten(args)
-        key = (structure, tuple((a.shape, a.dtype) for a in leaves), tuple(static.values()))
+    def _entry(self, leaves: list[Any], structure: Any, static: dict[str, Any]) -> tuple[Future[Any], Any]:
+        key = (structure, tuple([(a.shape, a.dtype) for a in leaves]), tuple(static.values()))
         if key not in self._executables:
             start = time.perf_counter()
             traced = self._traced(leaves, structure, static).trace(*leaves)
