@@ -84,7 +84,7 @@ def candidates(colour: np.ndarray) -> list[Candidate]:
         Candidate(
             "two_coats",
             "two coats over diffuse",
-            Stack((coat, under), diffuse, Corrected()),
+            Stack((coat, under), diffuse, Precise()),
             (*on_top, "under.alpha", "under.eta", "base.albedo"),
             "coat_diffuse",
         ),
