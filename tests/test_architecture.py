@@ -32,7 +32,7 @@ BRANCHES = [
         {"shader.glsl", "shader.helpers", "shader.names"},
         {"shader.primitives"},
         {"shader.printer"},
-        {"shader.export"},
+        {"shader.export", "shader.program"},
         {"shader.gl"},
         {"shader.verify", "shader.cost"},
     ],

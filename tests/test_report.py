@@ -1,13 +1,14 @@
 """Reports and pictures: what they say of a result, and what they show."""
 
 import io
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from layerfit.fit.words import SIGMA, measured, table
-from layerfit.report import pictures
+from layerfit.report import charts, pictures
 from layerfit.report.html import page
 from layerfit.report.text import image_error, lines, relative, worst
 
@@ -88,12 +89,16 @@ def test_a_good_fit_is_not_called_poor():
     assert "misses" not in "\n".join(lines(DOCUMENT | {"flags": []}))
 
 
+def page_of(name: str, document: dict) -> str:
+    return page(name, document, [], b"", [(0.1, "coarse", 0, 1.0)], "", {})
+
+
 def test_the_page_says_what_the_terminal_says():
-    text = page("<name>", DOCUMENT, b"", b"", "")
+    text = page_of("<name>", DOCUMENT)
     assert "&lt;name&gt;" in text
     assert "The model misses 23 % of the image." in text
     assert SIGMA in text.split("[[Fit]]")[0], "beside the table, not only in the lines below it"
-    assert "The model misses" not in page("", DOCUMENT | {"flags": []}, b"", b"", "")
+    assert "The model misses" not in page_of("", DOCUMENT | {"flags": []})
     assert "<td>&plusmn; –</td>" in table(DOCUMENT["parameters"])
     assert "<td>um</td>" in table(DOCUMENT["parameters"])
 
@@ -194,4 +199,16 @@ def test_a_long_caption_stays_over_its_panel():
     "rows", [[(0.1, "coarse", 0, 1.0)], [(0.5, "coarse", 0, 9.0), (0.7, "fine 1", 0, 1e-7), (9.0, "fine 2", 0, 0.0)]]
 )
 def test_convergence_is_drawn_whatever_the_steps(rows):
-    assert opened(pictures.convergence(rows)).shape == (300, 760, 3)
+    drawn = ElementTree.fromstring(charts.convergence(rows))
+    dots = [node for node in drawn.iter("circle") if node.get("r") == "2.2"]
+    assert len(dots) == len(rows)
+    for dot in dots:
+        assert charts.LEFT <= float(dot.get("cx", "")) <= charts.WIDTH - charts.RIGHT
+        assert charts.TOP <= float(dot.get("cy", "")) <= charts.HEIGHT - charts.LOW
+
+
+def test_correlations_are_a_triangle():
+    table = ElementTree.fromstring(charts.correlations([["a", "b", 0.9], ["c", "<a>", -0.6]]))
+    rows = [[cell.text for cell in row.iter("td")] for row in table.iter("tr")][1:]
+    assert rows == [["+0.90"], [None, None], [None, None, "-0.60"]]
+    assert "No two parameters" in charts.correlations([])

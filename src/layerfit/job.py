@@ -30,7 +30,8 @@ from .forms.accuracy import against_walk
 from .forms.precise import Precise, refuses
 from .preset import model_name, preset_of
 from .render import brdf_values, predict
-from .report import advice, html, pictures, planes
+from .report import advice, html, pictures, planes, viewer
+from .report.comparison import Pair
 from .shader.export import Shader, print_material
 from .shader.gl import renderer
 from .shader.verify import FLOOR, MAX_REL, P999_REL, Parity, check_image, check_pairs, compare, shade_samples, together
@@ -102,7 +103,6 @@ def fit_scene(
     parity = together([*(drawing.parity for drawing in drawings), check_pairs(shader)])
     verified = time.perf_counter()
     picture = pictures.strip([drawing.row() for drawing in drawings])
-    convergence = pictures.convergence([(row.time_s, row.stage, row.start, row.error) for row in result.trace])
     errors = mean_error(drawings)
     quadrature = _quadrature(result)
     now = time.perf_counter()
@@ -138,7 +138,11 @@ def fit_scene(
     if in_planes is not None:
         write_bytes(directory / "planes.png", in_planes)
     write_text(directory / "preset.json", json.dumps(preset_of(result.stack, name, fit=_summary(document)), indent=2) + "\n")
-    write_text(directory / "report.html", html.page(name, document, picture, convergence, shader.text(), in_planes))
+    trace = [(row.time_s, row.stage, row.start, row.error) for row in result.trace]
+    pairs = [drawing.pair() for drawing in drawings]
+    live = viewer.live(result.stack, name, document["parameters"])
+    report = html.page(name, document, pairs, picture, trace, shader.text(), live, in_planes)
+    write_text(directory / "report.html", report)
     write_text(directory / "fit.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
     return Outcome(document, directory, result.converged and parity.passed)
 
@@ -222,6 +226,14 @@ class Drawing:
             pictures.shown("shader (OpenGL)", image, white),
             pictures.difference(image, target, white, covered),
         ]
+
+    def pair(self) -> Pair:
+        """Reference and shader, for a page that compares them."""
+        covered, picture = self.compared.covered, self.compared.picture
+        name = self.compared.reference.path.stem
+        return Pair(
+            name, picture, self.drawn.image(self.shader), covered, exposure(self.compared.image(self.compared.target), covered)
+        )
 
     def error(self) -> dict[str, float]:
         """Image errors of the shader against the reference."""

@@ -23,7 +23,7 @@ class Panel:
 
 _Font = ImageFont.FreeTypeFont | ImageFont.ImageFont  # the second where Pillow comes without FreeType
 
-_RAMP = (
+RAMP = (
     np.array([[0, 0, 4], [51, 13, 96], [120, 28, 109], [187, 55, 84], [237, 105, 37], [252, 180, 25], [252, 255, 164]]) / 255.0
 )
 """Dark to bright through violet and orange: even in lightness, and readable without colour vision."""
@@ -38,18 +38,26 @@ _GAP, _LINE_HEIGHT = 8, 22
 
 def false_colour(values: np.ndarray) -> np.ndarray:
     """Values (H, W) in [0, 1] as colours."""
-    x = np.clip(values, 0.0, 1.0) * (len(_RAMP) - 1)
-    low = np.minimum(x.astype(int), len(_RAMP) - 2)
+    x = np.clip(values, 0.0, 1.0) * (len(RAMP) - 1)
+    low = np.minimum(x.astype(int), len(RAMP) - 2)
     t = (x - low)[..., None]
-    return _RAMP[low] * (1.0 - t) + _RAMP[low + 1] * t
+    return RAMP[low] * (1.0 - t) + RAMP[low + 1] * t
 
 
 def difference(image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray) -> Panel:
     """Absolute difference of two linear images in false colour; its scale ends at the 99th percentile."""
-    error = np.where(covered, np.nan_to_num(np.mean(np.abs(image - reference), -1)), 0.0) / white
-    top = max(float(np.quantile(error[covered], 0.99)), 1e-6)
-    picture = np.where(covered[..., None], false_colour(error / top), _NOT_COMPARED)
-    return Panel("difference", picture, f"{100.0 * top:.2g} % of white")
+    error, end = _error(image, reference, white, covered), top(image, reference, white, covered)
+    picture = np.where(covered[..., None], false_colour(error / end), _NOT_COMPARED)
+    return Panel("difference", picture, f"{100.0 * end:.2g} % of white")
+
+
+def top(image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray) -> float:
+    """End of the scale of a difference, in parts of white."""
+    return max(float(np.quantile(_error(image, reference, white, covered)[covered], 0.99)), 1e-6)
+
+
+def _error(image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray) -> np.ndarray:
+    return np.where(covered, np.nan_to_num(np.mean(np.abs(image - reference), -1)), 0.0) / white
 
 
 def shown(caption: str, image: np.ndarray, white: float) -> Panel:
@@ -109,49 +117,6 @@ def _draw_scale(canvas: Image.Image, draw: ImageDraw.ImageDraw, at: tuple[int, i
     if left - 16 > x + bar + 24 + draw.textlength(end, font=font):
         draw.rectangle((left - 15, y, left - 6, y + 9), fill=(grey, grey, grey))
         draw.text((left, y - 3), text, fill=INK, font=font)
-
-
-def convergence(rows: Sequence[tuple[float, str, int, float]]) -> bytes:
-    """Error of a fit against its run time, a dot a step of (seconds, stage, start, error), as a PNG: one line a start."""
-    width, height, left, right, low, top = 760, 300, 64, 16, 44, 34
-    canvas = Image.new("RGB", (width, height), BACKGROUND)
-    draw = ImageDraw.Draw(canvas)
-    font = ImageFont.load_default(13)
-    error = np.log10(np.maximum([row[3] for row in rows], 1e-30))
-    floor, ceiling = np.floor(error.min()), np.ceil(error.max() + 1e-9)
-    end = max(rows[-1][0], 1e-9)
-    to_x = lambda t: left + t / end * (width - left - right)  # noqa: E731
-    to_y = lambda e: top + (ceiling - e) / (ceiling - floor) * (height - top - low)  # noqa: E731
-    for decade in np.arange(floor, ceiling + 1, max(1.0, np.ceil((ceiling - floor) / 6))):
-        draw.line([(left, to_y(decade)), (width - right, to_y(decade))], fill=LINE)
-        draw.text(
-            (10, to_y(decade) - 8), f"{10.0**decade:.0e}" if abs(decade) > 3 else f"{10.0**decade:g}", fill=INK, font=font
-        )
-    for second in ticks(end):
-        draw.line([(to_x(second), height - low), (to_x(second), height - low + 5)], fill=INK)
-        draw.text((to_x(second) - 6, height - low + 8), f"{second:g}", fill=INK, font=font)
-    draw.text((width / 2 - 70, height - 18), "seconds since the fit began", fill=INK, font=font)
-    stages = list(dict.fromkeys(row[1].split()[0] for row in rows))
-    colours = {s: _stage_colour(i / max(len(stages) - 1, 1)) for i, s in enumerate(stages)}
-    before: tuple[str, int] | None = None
-    for k, (t, stage, start, _) in enumerate(rows):
-        colour, point = colours[stage.split()[0]], (to_x(t), to_y(error[k]))
-        if (stage, start) == before:
-            draw.line([(to_x(rows[k - 1][0]), to_y(error[k - 1])), point], fill=colour)
-        draw.ellipse([point[0] - 2, point[1] - 2, point[0] + 2, point[1] + 2], fill=colour)
-        before = stage, start
-    draw.text((10, 8), "error of the pixels in use, relative:", fill=INK, font=font)
-    x = 10 + draw.textlength("error of the pixels in use, relative:", font=font) + 16
-    for stage, colour in colours.items():
-        draw.ellipse([x, 13, x + 7, 20], fill=colour)
-        draw.text((x + 12, 8), stage, fill=INK, font=font)
-        x += 28 + draw.textlength(stage, font=font)
-    return png(canvas)
-
-
-def _stage_colour(place: float) -> tuple[int, int, int]:
-    r, g, b = (round(255 * float(v)) for v in false_colour(np.array([[0.4 + 0.55 * place]]))[0, 0])
-    return r, g, b
 
 
 def ticks(end: float) -> np.ndarray:

@@ -4,7 +4,8 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .html import STYLE, figure
+from . import pages
+from .html import figure
 from .scatter import Panel, Point, scatter
 from .truth import percent
 
@@ -139,10 +140,8 @@ def page(document: Mapping[str, Any], drawing: bytes) -> str:
     """The same as one HTML file that makes no request."""
     fitted = [fit_cells(row) for row in document["fits"] if "absent" not in row]
     phong, per_light = document["phong"]["instructions"], document["phong"]["instructions_per_light"]
-    return f"""<!doctype html>
-<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>{html.escape(document["name"])}: error against run time</title><style>{STYLE}</style>
-<h1>{html.escape(document["name"])}: error against run time</h1>
+    title = f"{document['name']}: error against run time"
+    body = f"""<h1>{html.escape(title)}</h1>
 {"".join(f"<p>{html.escape(sentence)}</p>" for sentence in document["in_words"])}
 {figure(drawing, "error against run time", "Both scales are logarithmic. Amber: nothing that is cheaper is as near.")}
 <h2>Shaders</h2>
@@ -150,9 +149,8 @@ def page(document: Mapping[str, Any], drawing: bytes) -> str:
 <p class=soft>Time over that of Phong in the same round: median of {document["rounds"]} rounds, and its quartiles. Instructions of SPIR-V after
 spirv-opt -O ({html.escape(document["counted_by"])}); Phong has {phong}, and {per_light} for each further light.
 Max, p99.9 and RMS are relative, over random and extreme pairs of directions, delta E 2000 over pixels, against the material itself.</p>
-{"<h2>Fits</h2>" + _html_table(_FITS, fitted) if fitted else ""}
-</html>
-"""
+{"<h2>Fits</h2>" + _html_table(_FITS, fitted) if fitted else ""}"""
+    return pages.page(title, body)
 
 
 def _html_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -3,7 +3,7 @@
 import dataclasses
 import re
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -20,7 +20,7 @@ from ..forms.precise import BAKED, Precise, held
 from ..optics.lazanyi import fit_lazanyi
 from ..preset import left_out, model_name
 from ..stack import PREPARED, Stack, at, evaluate, prepared
-from .printer import PREFIX, Printer
+from .printer import PREFIX, Printer, named_leaves
 
 SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ()), "sky": ("float", ())}
 """What a material may read of a place: its type in the shader and in JAX."""
@@ -71,7 +71,8 @@ class Shader:
         if weathering.grows(self.stack.layers):
             return "\n".join(f"// {line}" for line in [lines[0], f"Printed by layerfit {__version__}.", *lines[2:]])
         covered = (*self.stack.layers, self.stack.base)[1:]
-        if not self.uniforms and any(name == "eta" for layer in covered for name, _ in params(layer)):
+        constants = not any(name.startswith("u_") for name in self.uniforms)
+        if constants and any(name == "eta" for layer in covered for name, _ in params(layer)):
             lines += ["Indices of refraction are relative to the layer above: its own index divides those in the preset."]
         lines += approximations(self.stack)
         return "\n".join(f"// {line}" for line in lines)
@@ -94,8 +95,12 @@ def approximations(stack: Stack) -> list[str]:
     return lines
 
 
-def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
-    """Print a material: its values as constants, or as uniforms `u_LAYER_FIELD` from which the shader computes its constants."""
+def print_material(stack: Stack, name: str, uniforms: bool | Literal["prepared"] = False) -> Shader:
+    """Print a material: its values as constants, or as uniforms `u_LAYER_FIELD` from which the shader computes its constants.
+
+    `uniforms="prepared"`: the constants themselves are uniforms, whose names they keep. The shader then costs what one with constants
+    does, and its host computes them: `Shader.uniforms` has those of this material, `program.program` what gives those of another.
+    """
     stack = stack.astype(jnp.float32)
     printer = Printer(CHUNKS)
     w = jnp.array([0.0, 0.0, 1.0], jnp.float32)
@@ -105,7 +110,7 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
         there = Place(**dict(zip(stack.reads, place, strict=True))) if place else None
         return jnp.broadcast_to(evaluate(stack.form, at(prepared, there), wi, wo), (3,))
 
-    if uniforms:
+    if uniforms is True:
         _check_live(stack)
         rows, leaves = _uniforms(stack), jax.tree.leaves(stack)
         given = [row for row in rows if row]
@@ -125,8 +130,12 @@ def print_material(stack: Stack, name: str, uniforms: bool = False) -> Shader:
         with jax.enable_x64(False):
             made = jax.tree.map(np.asarray, prepared(stack))
         outside = [(part, f"{PREFIX}{name}") for name, part in _parts(stack, made)]
-        declarations = "\n".join(printer.constant(name, part) for part, name in outside)
-        values = {}
+        if uniforms:
+            declarations = "".join(printer.uniform(name, part) for part, name in outside)
+            values = {name: leaf for part, root in outside for name, leaf in named_leaves(root, part)}
+        else:
+            declarations = "\n".join(printer.constant(name, part) for part, name in outside)
+            values = {}
         structure = jax.tree.structure(made)
 
         def local(*args: Any) -> Any:

@@ -71,6 +71,12 @@ class Printer:
         ]
         return f"const {struct.name} {name} = {struct.name}(\n{''.join(lines)});\n"
 
+    def uniform(self, name: str, value: Any) -> str:
+        """Declare a struct or a number as a uniform."""
+        leaves = [(key, glsl_type(np.asarray(leaf, np.float32))) for key, leaf in _leaves(value)]
+        kind = self.struct(value, leaves).name if dataclasses.is_dataclass(value) else leaves[0][1]
+        return f"uniform {kind} {name};\n"
+
     def function(
         self, fn: Callable[..., Any], name: str, given: Sequence[tuple[Any, str]], params: Sequence[tuple[Any, str]]
     ) -> None:
@@ -282,7 +288,7 @@ class Body:
     def _loop(self, eqn: Any, operands: list[Value]) -> list[Value]:
         """A scan of fixed length over constant rows of numbers, as a counted loop."""
         p = eqn.params
-        closed, (constants, carries) = p["jaxpr"], _scan_sizes(p)
+        closed, (constants, carries) = p["jaxpr"], scan_sizes(p)
         if len(closed.jaxpr.outvars) != carries or p["reverse"]:
             raise PrintError(f"{self._where(eqn)}: only a forward scan without stacked outputs prints as a loop")
         outer, carry, rows = (
@@ -330,6 +336,11 @@ def _leaves(tree: Any) -> list[tuple[str, Any]]:
     return [(safe(jax.tree_util.keystr(path, simple=True, separator=".")), leaf) for path, leaf in leaves]
 
 
+def named_leaves(root: str, value: Any) -> list[tuple[str, np.ndarray]]:
+    """The numbers of a struct by the expressions that reach them, such as `lf_coat.eta`; of a number, that alone."""
+    return [(f"{root}.{path}" if path else root, np.asarray(leaf, np.float32)) for path, leaf in _leaves(value)]
+
+
 def _group(paths: Sequence[str], avals: Sequence[Any]) -> list[tuple[str, list[tuple[str, str]]]]:
     """Leaves such as `coat.alpha`, `coat.eta`, `c` by their argument: coat with two fields, c with none."""
     groups: list[tuple[str, list[tuple[str, str]]]] = []
@@ -367,7 +378,7 @@ def _struct_text(struct: StructType) -> str:
     return f"struct {struct.name} {{\n" + "".join(f"    {text:<{width}}  // {note}\n" for text, note in rows) + "};\n"
 
 
-def _scan_sizes(params: Mapping[str, Any]) -> tuple[int, int]:
+def scan_sizes(params: Mapping[str, Any]) -> tuple[int, int]:
     """How many operands of a scan are constants and how many are carried: two numbers in JAX 0.10, a tree in 0.12."""
     if "num_carry" in params:
         return params["num_consts"], params["num_carry"]

@@ -1,0 +1,30 @@
+// What a page holds: compressed data beside the text, unpacked here; then its viewers and comparisons.
+
+async function unpacked(name) {
+  const packed = Uint8Array.from(atob(document.getElementById(name).textContent), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+const readDocument = async (name) => JSON.parse(new TextDecoder().decode(await unpacked(name)));
+
+async function start() {
+  const page = { views: [], ready: false };
+  globalThis.layerfit = page;
+  for (const place of document.querySelectorAll("[data-compare]")) {
+    const data = JSON.parse(place.dataset.compare);
+    compare(place, data, await unpacked(data.pixels));
+  }
+  const places = document.querySelectorAll("[data-viewer]");
+  try {
+    const renderer = places.length ? new Renderer() : null;
+    for (const place of places) page.views.push(viewer(place, renderer, await readDocument(place.dataset.viewer)));
+  } catch (error) {
+    for (const place of places) place.textContent = `There is no live view here: ${error.message}.`;
+    throw error;
+  }
+  run(page.views);
+  page.ready = true;
+}
+
+start();

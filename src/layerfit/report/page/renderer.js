@@ -1,0 +1,226 @@
+// Draws materials with their exported shaders. One WebGL2 context serves a whole page: it draws out of sight, in linear float32, and
+// what it has drawn is copied to the canvas of the view that asked.
+
+const LIGHTS = 4;  // in one pass: the key light, and a point of each soft box
+const VERTEX = `#version 300 es
+precision highp float;
+layout(location = 0) in vec3 a_position;
+layout(location = 1) in vec3 a_normal;
+layout(location = 2) in vec3 a_tangent;
+layout(location = 3) in vec2 a_uv;
+uniform mat4 u_view_projection;
+out vec3 v_position;
+out vec3 v_normal;
+out vec3 v_tangent;
+out vec2 v_uv;
+void main() {
+    v_position = a_position;
+    v_normal = a_normal;
+    v_tangent = a_tangent;
+    v_uv = a_uv;
+    gl_Position = u_view_projection * vec4(a_position, 1.0);
+    gl_PointSize = 1.0;
+}`;
+const SCREEN = `#version 300 es
+void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }`;
+const ADD = `#version 300 es
+precision highp float;
+uniform highp sampler2D u_total;
+uniform highp sampler2D u_pass;
+out vec4 color;
+void main() { color = texelFetch(u_total, ivec2(gl_FragCoord.xy), 0) + texelFetch(u_pass, ivec2(gl_FragCoord.xy), 0); }`;
+// Passes are averaged over what they cover; outside of it the page shows through.
+const SHOW = `#version 300 es
+precision highp float;
+uniform highp sampler2D u_total;
+uniform float u_passes;
+uniform float u_exposure;
+uniform int u_tone;
+out vec4 color;
+vec3 neutral(vec3 c) {  // Khronos PBR Neutral tone mapper (2024): colours stay as they are up to 0.8
+    float x = min(c.r, min(c.g, c.b));
+    c -= x < 0.08 ? x - 6.25 * x * x : 0.04;
+    float peak = max(c.r, max(c.g, c.b));
+    if (peak < 0.76) return c;
+    float d = 1.0 - 0.76;
+    float next = 1.0 - d * d / (peak + d - 0.76);
+    return mix(c * next / peak, vec3(next), 1.0 - 1.0 / (0.15 * (peak - next) + 1.0));
+}
+vec3 filmic(vec3 c) {  // fit to the ACES curve (Narkowicz 2015)
+    return c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14);
+}
+void main() {
+    vec4 total = texelFetch(u_total, ivec2(gl_FragCoord.xy), 0);
+    vec3 c = max(u_exposure * total.rgb / max(total.a, 1e-6), 0.0);
+    c = clamp(u_tone == 1 ? neutral(c) : u_tone == 2 ? filmic(c) : c, 0.0, 1.0);
+    c = mix(12.92 * c, 1.055 * pow(max(c, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
+    float a = total.a / u_passes;
+    color = vec4(c * a, a);
+}`;
+
+class Renderer {
+  constructor() {
+    this.canvas = document.createElement("canvas");
+    const gl = this.canvas.getContext("webgl2", { alpha: true, antialias: false, premultipliedAlpha: true });
+    if (!gl) throw new Error("this browser has no WebGL 2");
+    if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this browser cannot draw to float textures");
+    this.gl = gl;
+    this.meshes = {};
+    this.add = this.link(SCREEN, ADD);
+    this.show = this.link(SCREEN, SHOW);
+    this.nothing = gl.createVertexArray();
+  }
+
+  link(vertex, fragment) {
+    const gl = this.gl;
+    const program = gl.createProgram();
+    for (const [type, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(type);
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+    const places = {};
+    return { program, at: (name) => (places[name] ??= gl.getUniformLocation(program, name)) };
+  }
+
+  // A fragment shader as `layerfit export --target essl300` prints it, for so many lights.
+  material(fragment) {
+    return this.link(VERTEX, fragment.replace("\n", `\n#define LF_LIGHTS ${LIGHTS}\n`));
+  }
+
+  mesh(shape) {
+    return (this.meshes[shape] ??= this.upload(mesh(SHAPES[shape])));
+  }
+
+  upload({ vertices, triangles }) {
+    const gl = this.gl;
+    const array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, vertices, gl.STATIC_DRAW);
+    [3, 3, 3, 2].reduce((offset, size, k) => {
+      gl.enableVertexAttribArray(k);
+      gl.vertexAttribPointer(k, size, gl.FLOAT, false, 44, 4 * offset);
+      return offset + size;
+    }, 0);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
+    return { array, count: triangles.length, mode: gl.TRIANGLES };
+  }
+
+  // A float picture: what one pass draws to, with depth, or what passes are added up in.
+  target(width, height, depth = false) {
+    const gl = this.gl;
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, width, height);
+    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
+    const buffer = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+    let render = null;
+    if (depth) {
+      render = gl.createRenderbuffer();
+      gl.bindRenderbuffer(gl.RENDERBUFFER, render);
+      gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, width, height);
+      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, render);
+    }
+    return { texture, buffer, render, width, height };
+  }
+
+  release(target) {
+    this.gl.deleteTexture(target.texture);
+    this.gl.deleteFramebuffer(target.buffer);
+    if (target.render) this.gl.deleteRenderbuffer(target.render);
+  }
+
+  // One pass: a shape in a material, seen by a camera under lights [[x, y, z, w], [r, g, b]].
+  draw(target, material, values, shape, camera, lights) {
+    const gl = this.gl;
+    const { program, at } = material;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.buffer);
+    gl.viewport(0, 0, target.width, target.height);
+    gl.enable(gl.DEPTH_TEST);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.useProgram(program);
+    for (const [name, value] of values) {
+      if (value.length === 3) gl.uniform3fv(at(name), value);
+      else if (value.length === 4) gl.uniform4fv(at(name), value);
+      else if (value.length === 2) gl.uniform2fv(at(name), value);
+      else gl.uniform1fv(at(name), value);
+    }
+    gl.uniformMatrix4fv(at("u_view_projection"), false, camera.matrix);
+    gl.uniform3fv(at("u_eye"), camera.eye);
+    gl.uniform3fv(at("u_up"), [0, 1, 0]);
+    gl.uniform4fv(at("u_light"), lights.flatMap(([place]) => place));
+    gl.uniform3fv(at("u_light_rgb"), lights.flatMap(([, rgb]) => rgb));
+    const { array, count, mode } = this.mesh(shape);
+    gl.bindVertexArray(array);
+    gl.drawElements(mode, count, gl.UNSIGNED_INT, 0);
+    gl.disable(gl.DEPTH_TEST);
+  }
+
+  screen({ program, at }, textures, numbers) {
+    const gl = this.gl;
+    gl.useProgram(program);
+    Object.entries(textures).forEach(([name, texture], k) => {
+      gl.activeTexture(gl.TEXTURE0 + k);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.uniform1i(at(name), k);
+    });
+    for (const [name, [set, value]] of Object.entries(numbers)) gl[set](at(name), value);
+    gl.bindVertexArray(this.nothing);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  sum(to, total, pass) {
+    this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, to.buffer);
+    this.gl.viewport(0, 0, to.width, to.height);
+    this.screen(this.add, { u_total: total.texture, u_pass: pass.texture }, {});
+  }
+
+  // The mean of passes, as it is shown: onto the context of another canvas.
+  present(total, passes, exposure, tone, context) {
+    const gl = this.gl;
+    if (this.canvas.width !== total.width || this.canvas.height !== total.height) {
+      this.canvas.width = total.width;
+      this.canvas.height = total.height;
+    }
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, total.width, total.height);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    this.screen(this.show, { u_total: total.texture }, {
+      u_passes: ["uniform1f", passes], u_exposure: ["uniform1f", exposure], u_tone: ["uniform1i", tone],
+    });
+    context.clearRect(0, 0, total.width, total.height);
+    context.drawImage(this.canvas, 0, 0);
+  }
+
+  // Linear numbers of a target, row 0 at the bottom.
+  read(target) {
+    const out = new Float32Array(4 * target.width * target.height);
+    this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, target.buffer);
+    this.gl.readPixels(0, 0, target.width, target.height, this.gl.RGBA, this.gl.FLOAT, out);
+    return out;
+  }
+}
+
+// The camera that looks at the origin from a distance, 26 degrees across; `shift` moves the picture by parts of a pixel.
+function camera(yaw, pitch, distance, width, height, shift = [0, 0]) {
+  const back = [Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)];
+  const right = unit(cross([0, 1, 0], back));
+  const up = cross(back, right);
+  const [near, far] = [distance - 2, distance + 2];
+  const f = Math.min(height, width) / Math.tan((13 * Math.PI) / 180);
+  const [x, y, dx, dy] = [f / width, f / height, (2 * shift[0]) / width, (2 * shift[1]) / height];
+  const z = (far + near) / (far - near);
+  const matrix = new Float32Array(16);
+  for (let k = 0; k < 3; k++) matrix.set([x * right[k] - dx * back[k], y * up[k] - dy * back[k], -z * back[k], -back[k]], 4 * k);
+  matrix.set([dx * distance, dy * distance, z * distance - (2 * far * near) / (far - near), distance], 12);
+  return { eye: times(back, distance), matrix, right, up, back, scale: [x, y] };
+}

@@ -1,0 +1,132 @@
+// A picture of a material that can be turned and lit: passes of the shader, each with other points of the lights, added up until still.
+
+// Soft boxes: their middle, the halves of their sides, and their irradiance on a surface that faces them.
+const STUDIO = [
+  { to: [-0.7, 0.45, 0.55], across: [0.22, 0, 0.28], along: [0, 0.42, -0.1], rgb: [1.1, 1.1, 1.1] },
+  { to: [0.85, 0.15, 0.2], across: [0.05, 0, -0.2], along: [0, 0.6, 0], rgb: [0.7, 0.72, 0.76] },
+  { to: [0.1, 0.98, -0.15], across: [0.5, 0, 0], along: [0, 0, 0.28], rgb: [0.8, 0.78, 0.74] },
+];
+const KEY = { size: 0.035, irradiance: 2.2 };
+const PASSES = 768;
+
+class View {
+  constructor(renderer, canvas, fragment, values) {
+    this.renderer = renderer;
+    this.canvas = canvas;
+    this.context = canvas.getContext("2d");
+    this.material = renderer.material(fragment);
+    this.values = values;
+    this.shape = "sphere";
+    this.orbit = { yaw: 0, pitch: 0.17, distance: 5 };
+    this.light = { yaw: -0.65, pitch: 0.6 };
+    this.shares = { key: 1, studio: 1 };
+    this.exposure = 0;
+    this.tone = 0;
+    this.visible = true;
+    this.passes = 0;
+    this.limit = PASSES;
+    this.atOnce = 1;
+    this.fineness = 1;
+    this.onchange = () => {};
+  }
+
+  // Begin anew: something has changed.
+  change(changes = {}) {
+    Object.assign(this, changes);
+    this.passes = 0;
+    this.onchange();
+  }
+
+  resize() {
+    const ratio = this.fineness * Math.min(window.devicePixelRatio || 1, 2);
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map((x) => Math.max(1, Math.round(x * ratio)));
+    if (this.canvas.width === width && this.canvas.height === height && this.pass) return;
+    this.release();
+    [this.canvas.width, this.canvas.height] = [width, height];
+    this.pass = this.renderer.target(width, height, true);
+    this.totals = [0, 1].map(() => this.renderer.target(width, height));
+    this.passes = 0;
+  }
+
+  release() {
+    for (const target of this.pass ? [this.pass, ...this.totals] : []) this.renderer.release(target);
+    this.pass = null;
+  }
+
+  // Lights of one pass: a point of the key light and of each soft box, by a sequence that fills a square evenly (Roberts 2018).
+  lights(k) {
+    const at = (n) => [(0.5 + 0.7548776662 * (k + 0.37 * n)) % 1, (0.5 + 0.5698402910 * (k + 0.61 * n)) % 1].map((x) => 2 * x - 1);
+    const { yaw, pitch } = this.light;
+    const key = [Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)];
+    const [a, b] = at(0);
+    const side = unit(cross([0, 1, 0], key));
+    const point = [0, 1, 2].map((i) => key[i] + KEY.size * (a * side[i] + b * cross(key, side)[i]));
+    const boxes = STUDIO.map(({ to, across, along, rgb }, n) => {
+      const [s, t] = at(n + 1);
+      return [[...unit(to.map((x, i) => x + s * across[i] + t * along[i])), 0], times(rgb, this.shares.studio)];
+    });
+    return [[[...point, 0], times([1, 1, 1], KEY.irradiance * this.shares.key)], ...boxes];
+  }
+
+  frame() {
+    this.resize();
+    const { width, height } = this.canvas;
+    const { yaw, pitch, distance } = this.orbit;
+    for (let n = 0; n < this.atOnce && this.passes < this.limit; n++) {
+      const k = this.passes;
+      const shift = k ? [((k * 0.618034) % 1) - 0.5, ((k * 0.754878) % 1) - 0.5] : [0, 0];
+      const seen = camera(yaw, pitch, distance, width, height, shift);
+      this.renderer.draw(this.pass, this.material, this.values, this.shape, seen, this.lights(k));
+      if (k === 0) this.clear(this.totals[0]);
+      this.renderer.sum(this.totals[(k + 1) % 2], this.totals[k % 2], this.pass);
+      this.passes++;
+    }
+    this.present();
+  }
+
+  clear(target) {
+    this.renderer.gl.bindFramebuffer(this.renderer.gl.FRAMEBUFFER, target.buffer);
+    this.renderer.gl.clearBufferfv(this.renderer.gl.COLOR, 0, [0, 0, 0, 0]);
+  }
+
+  present() {
+    if (this.pass) this.renderer.present(this.totals[this.passes % 2], this.passes, 2 ** this.exposure, this.tone, this.context);
+  }
+
+  // One pass of given lights at a given size, as linear numbers: what a test compares with another driver.
+  snapshot(width, height, lights) {
+    const target = this.renderer.target(width, height, true);
+    const { yaw, pitch, distance } = this.orbit;
+    const seen = camera(yaw, pitch, distance, width, height);
+    this.renderer.draw(target, this.material, this.values, this.shape, seen, lights);
+    const pixels = this.renderer.read(target);
+    this.renderer.release(target);
+    return { pixels, eye: seen.eye, matrix: seen.matrix };
+  }
+}
+
+// Draws those views of a page that are in sight and not yet still; more passes a frame where the machine keeps up.
+function run(views) {
+  const seen = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) {
+      const view = views.find(({ canvas }) => canvas === target);
+      view.visible = isIntersecting;
+      if (!isIntersecting) view.release();
+    }
+  }, { rootMargin: "100px" });
+  views.forEach(({ canvas }) => seen.observe(canvas));
+  window.addEventListener("resize", () => views.forEach((view) => view.change()));
+  let before = 0;
+  const frame = (now) => {
+    const waited = now - before;
+    before = now;
+    for (const view of views) {
+      if (!view.visible || (view.passes >= view.limit && view.pass)) continue;
+      view.atOnce = Math.min(Math.max(waited < 24 ? view.atOnce + 1 : view.atOnce >> 1, 1), 8);
+      if (waited > 250 && view.passes > 0 && view.passes < 3) view.fineness = Math.max(view.fineness / 2, 0.25);  // no GPU
+      view.frame();
+    }
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+}

@@ -1,0 +1,50 @@
+"""A headless Chromium for tests of pages: WebGL 2 by SwiftShader, so that no GPU is needed."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """The browser; the test is skipped where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="pages are tested with playwright: pip install playwright")
+    with playwright.sync_playwright() as p:
+        found = next((path for name in NAMES if (path := shutil.which(name))), None) or p.chromium.executable_path
+        if not Path(found).exists():
+            pytest.skip("no Chromium to test pages in: apt-get install chromium, or playwright install chromium")
+        browser = p.chromium.launch(executable_path=found, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def opened(browser: Any, address: str, **options: Any) -> Iterator[Any]:
+    """A page when its scripts are ready. It may say nothing on the console and ask for nothing but itself."""
+    page = browser.new_page(viewport={"width": 900, "height": 600}, **options)
+    said: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: said.append(request.url) if request.url != address else None)
+    page.goto(address)
+    until(page, "globalThis.layerfit?.ready")
+    yield page
+    page.close()
+    said = [text for text in said if "GPU stall due to ReadPixels" not in text]  # the test's own reading
+    assert not said, said
+
+
+def until(page: Any, expression: str) -> None:
+    """Wait for something to be so in a page. (Playwright's own wait evaluates text, which the page forbids.)"""
+    for _ in range(600):
+        if page.evaluate(expression):
+            return
+        page.wait_for_timeout(50)
+    pytest.fail(f"{expression} has not become so in half a minute")

@@ -1,0 +1,234 @@
+"""Pages in a browser: they draw the exported shader, to the number; their sliders compute its constants as JAX does."""
+
+import dataclasses
+import json
+
+import jax
+import numpy as np
+import pytest
+
+from browser import chromium, opened, until
+from helpers import APPROXIMATE, STACKS
+from layerfit.fit.metrics import display
+from layerfit.preset import read_preset, stack_of
+from layerfit.report import pages
+from layerfit.report.comparison import Pair
+from layerfit.report.html import page as report_page
+from layerfit.report.viewer import live
+from layerfit.shader.export import print_material
+from layerfit.shader.gl import shade_points
+from layerfit.shader.program import program
+from layerfit.shader.verify import check_pairs
+from layerfit.stack import Stack, prepared
+from test_report import DOCUMENT
+
+SAME = 5e-5
+"""Pixels of two drivers, relative to the brightest: rounding of what they interpolate between vertices, seen through a lobe."""
+SHOWN = 1e-3
+"""The same as a screen shows them, before it rounds to 8 bits."""
+CONSTANTS = 1e-4
+"""Constants by a program whose tables are float32: coefficients of polynomials of degree 7 have their rounding some hundred times over.
+What they come to is compared as tightly as any shader."""
+
+SIDE = 96
+LIGHTS = [[[-0.4, 0.6, 0.7, 0.0], [3.0, 2.0, 1.0]], [[2.0, -1.0, 3.0, 1.0], [5.0, 9.0, 14.0]]]
+LIGHTS += [[[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]] * 2
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def stack():
+    return read_preset("lacquered_copper")
+
+
+@pytest.fixture(scope="module")
+def pair():
+    rng = np.random.default_rng(0)
+    reference = rng.uniform(0.0, 2.0, (20, 30, 3))
+    covered = np.ones((20, 30), bool)
+    covered[0] = False
+    return Pair("copper <1>", reference, reference * 1.1, covered, 1.5)
+
+
+@pytest.fixture(scope="module")
+def report(browser, stack, pair, tmp_path_factory):
+    """The report of a fit, open in the browser."""
+    fitted = {"lacquer.tau": {"sigma": [0.01, 0.02, None]}, "copper.alpha": {"sigma": 0.003}}
+    trace = [(0.1, "coarse", 0, 1.0), (0.5, "fine 1", 0, 1e-3)]
+    text = report_page("copper", DOCUMENT, [pair], b"", trace, "void main() {}", live(stack, "copper", fitted))
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(text)
+    with opened(browser, path.as_uri()) as page:
+        page.evaluate(
+            "layerfit.views.forEach((view) => { view.canvas.style.width = view.canvas.style.height = '80px'; view.limit = 3; })"
+        )
+        yield page
+
+
+def evaluated(page, script, value=None):
+    """What a script gives, without lists of arrays that turn to objects on their way."""
+    return json.loads(page.evaluate(f"async (x) => JSON.stringify(await ({script})(x))", value))
+
+
+SNAPSHOT = """([fragment, points, side, lights]) => {
+    const view = layerfit.views[0];
+    const { renderer } = view;
+    const count = points.length / 11;
+    const mesh = renderer.upload({ vertices: new Float32Array(points), triangles: Uint32Array.from({ length: count }, (_, k) => k) });
+    renderer.meshes.points = { ...mesh, mode: renderer.gl.POINTS };
+    const drawn = { ...view, material: renderer.material(fragment), values: [], shape: "points" };
+    const s = view.snapshot.call(drawn, side, side, lights);
+    return { pixels: Array.from(s.pixels), eye: s.eye, matrix: Array.from(s.matrix) };
+}"""
+"""What the renderer draws of a shader, on points instead of triangles."""
+
+
+def points_of(seen):
+    """A point of the unit sphere for each pixel that looks at it: position, normal, tangent, uv; a row each, and the pixels."""
+    matrix = np.reshape(seen["matrix"], (4, 4)).T
+    at = (np.arange(SIDE) + 0.5) / SIDE * 2.0 - 1.0
+    ends = [np.stack([*np.meshgrid(at, at), np.full((SIDE, SIDE), z), np.ones((SIDE, SIDE))], -1) for z in (-1.0, 1.0)]
+    near, far = (p[..., :3] / p[..., 3:] for p in (end @ np.linalg.inv(matrix).T for end in ends))
+    eye, way = np.asarray(seen["eye"]), (far - near) / np.linalg.norm(far - near, axis=-1, keepdims=True)
+    b = way @ eye
+    root = b * b - (eye @ eye - 1.0)
+    hit = root > 1e-3
+    position = (eye + (-b - np.sqrt(np.maximum(root, 0.0)))[..., None] * way)[hit]
+    tangent = np.cross([0.0, 1.0, 0.0], position)
+    uv = np.stack([np.arctan2(position[:, 0], position[:, 2]), np.arccos(position[:, 1])], -1)
+    return np.concatenate([position, position * 1.7, tangent, uv], -1).astype("f4"), hit
+
+
+@pytest.mark.parametrize("name", ["lacquered_copper", "brushed_steel", "sparkling_silver_car_paint"])
+def test_pixels_are_those_of_the_exported_shader(gl, report, name):
+    """As `layerfit export` gives it, with constants. One point a pixel: drivers lay the vertices of triangles on grids of their own."""
+    shader = print_material(read_preset(name), name)
+    fragment = shader.text("essl300")
+    points, hit = points_of(
+        evaluated(
+            report, "(x) => { const c = camera(0.3, 0.2, 5, 96, 96); return { eye: c.eye, matrix: Array.from(c.matrix) }; }"
+        )
+    )
+    report.evaluate("Object.assign(layerfit.views[0].orbit, { yaw: 0.3, pitch: 0.2, distance: 5 })")
+    seen = evaluated(report, SNAPSHOT, [fragment, points.ravel().tolist(), SIDE, LIGHTS])
+    image = np.reshape(seen["pixels"], (SIDE, SIDE, 4))
+    np.testing.assert_array_equal(image[..., 3] == 1.0, hit)
+    image = image[hit][:, :3]
+    inputs = {"v_position": points[:, :3], "v_normal": points[:, 3:6], "v_tangent": points[:, 6:9], "v_uv": points[:, 9:]}
+    host = {"u_eye": tuple(seen["eye"]), "u_up": (0.0, 1.0, 0.0)}
+    host |= {"u_light": [tuple(place) for place, _ in LIGHTS], "u_light_rgb": [tuple(rgb) for _, rgb in LIGHTS]}
+    used = {key: value for key, value in inputs.items() if f" {key};" in fragment}
+    wanted = shade_points(fragment.replace("\n", "\n#define LF_LIGHTS 4\n", 1), used, host)
+    assert np.mean(wanted.max(-1) > 0.0) > 0.5
+    assert np.abs(image - wanted).max() <= SAME * wanted.max()
+    assert np.abs(display(image, 1.0) - display(wanted, 1.0)).max() <= SHOWN
+
+
+def constants(page):
+    return [np.asarray(v) for v in evaluated(page, "() => layerfit.views[0].constants().map((a) => Array.from(a))")]
+
+
+def shader_with(page, stack):
+    """The shader of a material with the constants that the page has computed."""
+    shader = print_material(stack, "copper", "prepared")
+    made = zip(shader.uniforms.items(), constants(page), strict=True)
+    return dataclasses.replace(shader, uniforms={name: np.reshape(new, value.shape) for (name, value), new in made})
+
+
+def test_sliders_give_the_shader_of_what_they_show(gl, report, stack):
+    """Alpha and index of the coat too: what they bring about is computed in the page, curves and bounces and all."""
+    assert check_pairs(shader_with(report, stack), 4096).passed
+    before = report.locator(".stage").screenshot()
+    for name, value in {"lacquer.alpha": "0.3", "lacquer.eta": "1.7"}.items():
+        box = report.get_by_label(f"{name}, number")
+        box.fill(value)
+        box.press("Enter")
+    document = json.loads(report.evaluate("layerfit.views[0].saved()"))
+    changed = stack_of({key: document[key] for key in ("model", "interface", "layers", "base")}, "saved")
+    assert float(changed.layers[0].alpha) == 0.3
+    assert float(changed.layers[0].eta) == 1.7
+    assert check_pairs(shader_with(report, changed), 4096).passed
+    until(report, "layerfit.views[0].passes > 1")
+    assert report.locator(".stage").screenshot() != before
+    report.get_by_role("button", name="Back to the start").click()
+    assert check_pairs(shader_with(report, stack), 4096).passed
+
+
+def test_a_slider_moves_by_keys_and_marks_what_was_fitted(report):
+    slider = report.get_by_label("copper.alpha", exact=True)
+    slider.focus()
+    slider.press("ArrowRight")
+    assert float(report.get_by_label("copper.alpha, number").input_value()) > 0.2
+    row = report.locator(".number", has=slider)
+    assert row.locator(".mark").count() == row.locator(".sigma").count() == 1
+    clear = report.locator(".number", has=report.get_by_label("copper.k r", exact=True))
+    assert clear.locator(".sigma").count() == 0
+
+
+def test_view_and_light_turn_by_keys_and_mouse(report):
+    read = "() => { const { orbit, light } = layerfit.views[0]; return { ...orbit, light: light.yaw }; }"
+    first = evaluated(report, read)
+    report.locator(".stage canvas").focus()
+    report.keyboard.press("ArrowRight")
+    report.keyboard.press("+")
+    turned = evaluated(report, read)
+    assert turned["yaw"] != first["yaw"]
+    assert turned["distance"] < first["distance"]
+    assert turned["light"] == first["light"]
+    report.locator(".sun").focus()
+    report.keyboard.press("ArrowLeft")
+    assert evaluated(report, read)["light"] != first["light"]
+    box = report.locator(".stage canvas").bounding_box()
+    report.mouse.move(box["x"] + 40, box["y"] + 40)
+    report.mouse.down()
+    report.mouse.move(box["x"] + 60, box["y"] + 40)
+    report.mouse.up()
+    assert evaluated(report, read)["yaw"] != turned["yaw"]
+
+
+def test_pictures_are_compared_pixel_by_pixel(report, pair):
+    swept = report.locator("[data-compare] canvas").first
+    swept.scroll_into_view_if_needed()
+    box = swept.bounding_box()
+    report.mouse.move(box["x"] + 0.75 * box["width"], box["y"] + 0.5 * box["height"])
+    said = report.locator(".said").inner_text()
+    want = pair.reference[10, 22]
+    assert said.startswith("x 22, y 10: reference " + " ".join(f"{v:.3f}"[:4] for v in want)[:4])
+    assert f"apart {100 * 0.1 * want.mean() / 1.5:.2f}"[:9] in said
+    colour = "(at) => { const c = document.querySelector('[data-compare] canvas'); return Array.from(c.getContext('2d').getImageData(...at, 1, 1).data); }"  # noqa: E501
+    left, right = (evaluated(report, colour, [x, 10])[:3] for x in (3, 27))
+    np.testing.assert_allclose(left, 255.0 * display(pair.reference[10, 3], 1.5), atol=1.0)
+    np.testing.assert_allclose(right, 255.0 * display(pair.fit[10, 27], 1.5), atol=1.0)
+
+
+def test_programs_compute_what_jax_computes(browser, tmp_path):
+    """One material of each way to prepare one, in double precision."""
+    kinds = (
+        "corrected over lambert",
+        "corrected, three layers",
+        "milky over lambert",
+        "precise, anisotropic",
+        "precise, two coats",
+    )
+    stacks = {name: (STACKS | APPROXIMATE)[name] for name in (*kinds, "conductor, Lazanyi")}
+    stacks |= {name: read_preset(name) for name in ("anodised_titanium", "patinated_copper", "polished_weathered_brass")}
+    cases = {}
+    for name, stack in stacks.items():
+        inputs = [np.asarray(leaf, float).ravel().tolist() for leaf in jax.tree.leaves(stack.astype(float))]
+        cases[name] = {"program": program(Stack.prepare, stack.astype(float)), "inputs": inputs}
+    page = browser.new_page()
+    page.add_script_tag(content=f"{pages.text('program.js')}; globalThis.compile = compile;")
+    run = "(cases) => Object.values(cases).map(({ program, inputs }) => compile(program)(inputs.map((a) => Float64Array.from(a))).map((a) => Array.from(a)))"  # noqa: E501
+    for (name, stack), made in zip(stacks.items(), evaluated(page, run, cases), strict=True):
+        wanted = jax.tree.leaves(prepared(stack.astype(float)))
+        assert len(made) == len(wanted), name
+        for got, want in zip(made, wanted, strict=True):
+            np.testing.assert_allclose(
+                got, np.ravel(want), rtol=0.0, atol=CONSTANTS * max(np.abs(want).max(), 1.0), err_msg=name
+            )
+    page.close()
