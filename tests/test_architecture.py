@@ -44,7 +44,7 @@ TOP = [
     {"study"},
     {"report"},
     {"tabulate", "job", "truth", "structures", "cache"},
-    {"tradeoffs", "specialising"},
+    {"batch", "tradeoffs", "specialising"},
     {"demo"},
     {""},
     {"cli"},

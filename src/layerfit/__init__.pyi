@@ -1,6 +1,7 @@
 # The public names, and where each is found. Read at run time too: it is the list that names are loaded by.
 
 from ._place import Place as Place
+from .batch import Batch as Batch, fit_batch as fit_batch
 from .cache import use_compilation_cache as use_compilation_cache
 from .capture.inspect import inspect as inspect
 from .capture.load import load as load

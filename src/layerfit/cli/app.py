@@ -91,6 +91,35 @@ class progress:
         self.bar.stop()
 
 
+class many:
+    """A bar on standard error for many fits: how many are done and failed, how fast, and how long the rest takes."""
+
+    def __enter__(self) -> Any:
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        text = TextColumn("{task.fields[failed]} failed, {task.fields[rate]}")
+        self.bar = Progress(
+            BarColumn(),
+            MofNCompleteColumn(),
+            text,
+            TimeRemainingColumn(),
+            console=stderr,
+            transient=True,
+            disable=not stderr.is_terminal,
+        )
+        self.bar.start()
+        self.task = self.bar.add_task("fits", total=None, failed=0, rate="")
+        return self.update
+
+    def update(self, done: int, failed: int, total: int) -> None:
+        speed = self.bar.tasks[0].speed
+        rate = f"{speed:.2f} fits/s" if speed else ""
+        self.bar.update(self.task, completed=done + failed, total=total, failed=failed, rate=rate)
+
+    def __exit__(self, *exc: object) -> None:
+        self.bar.stop()
+
+
 def _show_version(asked: bool) -> None:
     if asked:
         from .. import __version__

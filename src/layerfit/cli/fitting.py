@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .app import STARTED, Json, Scene, app, check_choice, emit, progress, say, stderr
+from .app import STARTED, Json, Scene, app, check_choice, emit, many, progress, say, stderr
 
 
 @app.command()
@@ -108,6 +108,64 @@ def structures(
     if as_json:
         emit(outcome.document)
     raise typer.Exit(0 if outcome.good else 1)
+
+
+@app.command()
+def batch(
+    scenes: Annotated[
+        list[str],
+        typer.Argument(
+            help="Scene files, patterns in quotes, directories of scenes, or manifests (.csv with a column `scene`)."
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the table.")] = Path("out"),
+    workers: Annotated[int, typer.Option(min=1, help="Processes that share the work.")] = 1,
+    each: Annotated[
+        bool, typer.Option("--each", help="A directory of each fit too, with all that `layerfit fit` leaves.")
+    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="One start, and sigmas of the noise alone.")] = False,
+    starts: Annotated[int | None, typer.Option(min=1, help="Starts that are tried for each.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")] = None,
+    metric: Annotated[str | None, typer.Option(help="law, uniform, relative, log or cube_root.")] = None,
+    loss: Annotated[str | None, typer.Option(help="square, huber or cauchy.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Fit many scenes into one table.
+
+    Leaves `results.csv`, `results.parquet` (where pyarrow is installed) and `batch.json`. What is interrupted goes on where it was when the
+    same command is given again. Exit code 1: some failed; their rows say why.
+
+    Example: `layerfit batch "examples/references/*.toml" -o out/batch`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..batch import fit_batch
+    from ..capture.scene import LOSSES, METRICS
+
+    check_choice(loss, LOSSES, "--loss")
+    check_choice(metric, METRICS, "--metric")
+    with many() as report:
+        done = fit_batch(
+            scenes,
+            output,
+            workers=workers,
+            each=each,
+            quick=quick,
+            progress=report,
+            starts=starts,
+            seed=seed,
+            metric=metric,
+            loss=loss,
+        )
+    for row in done.rows:
+        if row["error"]:
+            say(f"failed: {row['error']}")
+    document = done.document
+    say(f"{document['done']} done ({document['kept']} of them before), {document['failed']} failed: {document['table']}")
+    if as_json:
+        emit(document)
+    raise typer.Exit(0 if done.good else 1)
 
 
 @app.command()
