@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from layerfit import InputError, fit_batch
-from layerfit.batch import JOURNAL
+from layerfit.batch.table import JOURNAL
 
 REFERENCES = Path(__file__).parents[1] / "examples" / "references"
 QUICK = {"quick": True, "metric": "law"}

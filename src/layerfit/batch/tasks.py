@@ -1,0 +1,90 @@
+"""What a batch fits: scenes by file, pattern, directory or manifest, and what each fit depends on."""
+
+import csv
+import dataclasses
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+from glob import glob
+from pathlib import Path
+from typing import Any
+
+from ..capture.scene import read_scene
+from ..errors import InputError, LayerfitError
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """A scene, what its row is called and labelled, and how it is fitted."""
+
+    scene: Path
+    labels: dict[str, str]
+    directory: Path | None
+    """Where all that a fit leaves is written; None for the row alone."""
+    options: dict[str, Any]
+
+    def key(self) -> str:
+        """What this fit depends on: the scene's text, which files it reads and when they were written, and the options."""
+        from .. import __version__
+
+        digest = hashlib.sha256(
+            repr((__version__, self.scene.resolve(), sorted(self.options.items()), self.directory)).encode()
+        )
+        digest.update(self.scene.read_bytes() if self.scene.is_file() else b"")
+        for file in sorted(_files(self.scene)):
+            known = file.stat() if file.exists() else None
+            digest.update(repr((str(file), known and (known.st_size, known.st_mtime_ns))).encode())
+        return digest.hexdigest()[:24]
+
+
+def tasks_of(scenes: Sequence[str | Path], directory: Path, each: bool, options: dict[str, Any]) -> list[Task]:
+    found = [pair for scene in scenes for pair in _found(str(scene))]
+    named = [path.stem for path, _ in found]
+    tasks = []
+    for (path, labels), name in zip(found, named, strict=True):
+        own = name if named.count(name) == 1 else f"{name}_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:8]}"
+        tasks.append(Task(path, {"scene": str(path), **labels}, directory / own if each else None, options))
+    unique = {(task.scene.resolve(), tuple(task.labels.items())): task for task in tasks}
+    return list(unique.values())
+
+
+def _found(what: str) -> Iterator[tuple[Path, dict[str, str]]]:
+    """Scene files that a word of the command line stands for, each with its labels."""
+    path = Path(what)
+    if path.suffix == ".csv" and path.is_file():
+        yield from _manifest(path)
+        return
+    plain = [path] if path.is_file() else sorted(Path(name) for name in glob(what, recursive=True))
+    paths = sorted(path.glob("*.toml")) if path.is_dir() else plain
+    if not paths:
+        raise InputError(
+            f"{what}: there is no such scene. Give scene files, a pattern in quotes, a directory of .toml files, or a manifest (.csv)"
+        )
+    yield from ((path, {}) for path in paths)
+
+
+def _manifest(path: Path) -> Iterator[tuple[Path, dict[str, str]]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        lines = csv.DictReader(file)
+        if "scene" not in (lines.fieldnames or []):
+            raise InputError(
+                f"{path}: its first line should name the columns, one of them `scene`; it has {', '.join(lines.fieldnames or ['none'])}"
+            )
+        for line in lines:
+            if None in line or None in line.values():
+                raise InputError(f"{path}: line {lines.line_num} should have {len(lines.fieldnames or [])} columns")
+            yield path.parent / line.pop("scene"), line
+
+
+def _files(scene: Path) -> Iterable[Path]:
+    """Files that a scene reads; none where it cannot be read, which its fit will say."""
+    try:
+        references = read_scene(scene).references
+    except LayerfitError:
+        return []
+    lights = [light for reference in references for light in getattr(reference, "lights", ())]
+    files = [
+        *(r.path for r in references),
+        *(getattr(r, "mask", None) for r in references),
+        *(getattr(x, "file", None) for x in lights),
+    ]
+    return {file for file in files if file is not None}
