@@ -365,7 +365,7 @@ def test_a_closed_pipe_is_no_fault(scene):
 
 
 def test_light_from_everywhere_is_reported_as_a_quadrature(scene, gl, tmp_path, monkeypatch):
-    monkeypatch.setattr(importlib.import_module("layerfit.fit.fit"), "EVALUATIONS", 128 * 496)
+    monkeypatch.setattr(importlib.import_module("layerfit.fit.pixels"), "EVALUATIONS", 128 * 496)
     monkeypatch.setattr("layerfit.job.PICTURE_SAMPLES", 1)
     text = re.sub(r"\[\[light\]\].*?\[material\]", CONSTANT_LIGHT, scene.read_text(), flags=re.DOTALL)
     text = re.sub(r"free = .*", 'free = ["coat.tau"]', text).replace("reference.exr", "lit.exr")

@@ -1,13 +1,14 @@
 """Reports and pictures: what they say of a result, and what they show."""
 
 import io
+import re
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from layerfit.fit.words import SIGMA, measured, table
+from layerfit.fit.words import SIGMA, blocks, measured, remarks, table
 from layerfit.report import charts, pictures
 from layerfit.report.html import page
 from layerfit.report.text import image_error, lines, relative, worst
@@ -41,6 +42,7 @@ DOCUMENT = {
         "coat.tau": {"value": [0.1, 0.2, 0.3], "sigma": [0.01, 0.02, None], "derived": "absorption_per_mm * thickness_um"},
     },
     "correlations": [["coat.alpha", "coat.tau[0]", -0.97]],
+    "profiles": [{"parameter": "coat.alpha", "values": [0.05, 0.1, 0.2], "rise": [1.0, 0.0, 1.0]}],
     "unidentified": [{"direction": {}, "why": "a and b can change together without changing the image"}],
     "notes": ["base.alpha has no effect on this image and was held at its start"],
     "left_out": [],
@@ -53,6 +55,26 @@ DOCUMENT = {
     },
     "time": {"total_s": 2.0, "import_s": 0.5, "solve_s": 1.5},
 }
+
+
+def test_a_notebook_shows_what_the_terminal_does():
+    said = remarks([["a", "b", -0.97]], ["a and b <together>"], ["a note"], DOCUMENT["minima"])
+    text = blocks(said)
+    for line in ("C(a, b) = -0.970", "a and b &lt;together&gt;", "a note", "coat.alpha 0.25"):
+        assert line in text
+    assert blocks(remarks([], [], [], DOCUMENT["minima"][:1])) == ""
+
+
+def test_a_profile_is_drawn_with_its_ends():
+    row = {"parameter": "coat.eta", "values": [1.4, 1.45, 1.5, 1.55, 1.6], "rise": [4.0, 1.0, 0.0, 1.0, 4.0]}
+    drawn = charts.profiles([row, row])
+    assert drawn.count("<svg") == 2
+    points = [tuple(map(float, point.split(","))) for point in re.search(r'points="([^"]*)"', drawn)[1].split()]
+    assert [point[1] for point in points] == [points[4 - k][1] for k in range(5)], "symmetric"
+    assert max(points, key=lambda point: point[1]) == points[2], "the minimum is lowest, in the middle"
+    end = float(re.search(r'class="rule"[^>]* y1="([0-9.]+)"', drawn)[1])
+    assert points[1][1] == pytest.approx(end, abs=0.1), "the line is where the interval ends"
+    assert charts.profiles([]) == ""
 
 
 @pytest.mark.parametrize(

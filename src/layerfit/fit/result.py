@@ -93,7 +93,8 @@ class FitResult:
 
     def _repr_html_(self) -> str:
         """For notebooks."""
-        return f"<p>{html.escape(_heading(self))}</p>{words.table(parameters(self))}"
+        remarks = words.remarks(correlations(self), [row["why"] for row in unidentified(self)], self.notes, minima(self))
+        return f"<p>{html.escape(_heading(self))}</p>{words.table(parameters(self))}{words.blocks(remarks)}"
 
 
 def _heading(result: FitResult) -> str:

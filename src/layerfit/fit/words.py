@@ -48,6 +48,26 @@ def table(rows: Mapping[str, Mapping[str, Any]]) -> str:
     return f"<table><tr>{heads}</tr>{''.join(_row(name, row) for name, row in rows.items())}</table>"
 
 
+def remarks(
+    pairs: Sequence[Sequence[Any]], blind: Sequence[str], notes: Sequence[str], minima: Sequence[Mapping[str, Any]]
+) -> dict[str, list[str]]:
+    """What else is known of a fit, lines under their headings; a heading without lines is left out."""
+    found = {
+        "Correlations (below 0.5 are not listed)": [f"C({a}, {b}) = {r:+.3f}" for a, b, r in pairs[:12]],
+        "Identifiability": [*blind, *notes],
+        "Other minima (error over that of this one)": other_minima(minima),
+    }
+    return {heading: lines for heading, lines in found.items() if lines}
+
+
+def blocks(remarks: Mapping[str, Sequence[str]]) -> str:
+    """The same as HTML."""
+    return "".join(
+        f"<p><b>{html.escape(heading)}</b><br>{'<br>'.join(html.escape(line) for line in lines)}</p>"
+        for heading, lines in remarks.items()
+    )
+
+
 def _row(name: str, row: Mapping[str, Any]) -> str:
     value, sigma = measured(row["value"], row["sigma"])
     cells = f"<th>{html.escape(name)}</th><td>{value}</td><td>&plusmn; {sigma}</td><td>{html.escape(_unit(row))}</td>"

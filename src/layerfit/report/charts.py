@@ -1,7 +1,8 @@
 """Figures of a page as SVG and tables: they follow its colours, light or dark, and their text can be searched."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -82,3 +83,37 @@ def _cell(r: float | None) -> str:
         return "<td></td>"
     hue = "#d9480f" if r > 0.0 else "#2563eb"
     return f'<td style="--hue:{hue};--much:{0.7 * r * r:.2f}">{r:+.2f}</td>'
+
+
+_WIDE, _HIGH, _HIGHEST = 240, 170, 3.0
+"""Of the chart of one profile: its size, and the largest rise that is drawn."""
+
+
+def profiles(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The cost along each parameter, over the rise that ends its 95 % interval (the line); rows as in `fit.json`, nothing of none."""
+    if not rows:
+        return ""
+    said = "The cost along a parameter, all others fitted again. Where it crosses the line, the 95 % interval ends."
+    return f'<h3>Profiles</h3>{"".join(_profile(row) for row in rows)}<p class="soft">{said}</p>'
+
+
+def _profile(row: Mapping[str, Any]) -> str:
+    left, right, top, low = 10, _WIDE - 10, 28, _HIGH - 26
+    values, rise = np.array(row["values"], float), np.minimum(np.array(row["rise"], float), _HIGHEST)
+    x = lambda v: left + (v - values[0]) / max(values[-1] - values[0], 1e-12) * (right - left)  # noqa: E731
+    y = lambda r: low - r / _HIGHEST * (low - top)  # noqa: E731
+    hue = COLOURS[0]
+    points = " ".join(f"{x(v):.1f},{y(r):.1f}" for v, r in zip(values, rise, strict=True))
+    dots = [
+        f'<circle cx="{x(v):.1f}" cy="{y(r):.1f}" r="2.2" fill="{hue}"><title>{v:.4g}: {r:.3g}</title></circle>'
+        for v, r in zip(values, rise, strict=True)
+    ]
+    parts = [
+        *(f'<line class="rule" x1="{left}" x2="{right}" y1="{y(r):.1f}" y2="{y(r):.1f}"/>' for r in (1.0, 0.0)),
+        f'<polyline class="line" stroke="{hue}" points="{points}"/>',
+        *dots,
+        f'<text x="{left}" y="18">{escape(row["parameter"])}</text><text x="{left}" y="{_HIGH - 6}">{values[0]:.4g}</text>',
+        f'<text x="{right}" y="{_HIGH - 6}" text-anchor="end">{values[-1]:.4g}</text>',
+    ]
+    name = escape(f"cost along {row['parameter']}")
+    return f'<svg class="chart" style="width:{_WIDE}px" viewBox="0 0 {_WIDE} {_HIGH}" role="img" aria-label="{name}">{"".join(parts)}</svg>'

@@ -37,6 +37,7 @@ def page(
         parameters=words.table(document["parameters"]),
         sigma_is=escape(document["sigma_is"]),
         correlations=f"<h3>Correlations</h3>{charts.correlations(document['correlations'])}",
+        profiles=charts.profiles(document["profiles"]),
         convergence=charts.convergence(trace),
         left_out=escape(", ".join(document["left_out"]) or "nothing"),
         report=escape("\n".join(lines(document))),

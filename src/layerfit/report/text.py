@@ -29,16 +29,10 @@ def lines(document: Mapping[str, Any]) -> list[str]:
         out += [f"    {words.poor(d['misfit'])}"]
     out += [f"[[Parameters]] (sigmas are {d['sigma_is']})"]
     out += words.parameters(d["parameters"])
-    if d["correlations"]:
-        out += ["[[Correlations]] (below 0.5 are not listed)"]
-        out += [f"    C({a}, {b}) = {r:+.3f}" for a, b, r in d["correlations"][:12]]
-    if d["unidentified"] or d["notes"]:
-        out += ["[[Identifiability]]"]
-        out += [f"    {row['why']}" for row in d["unidentified"]]
-        out += [f"    {note}" for note in d["notes"]]
-    others = words.other_minima(d["minima"])
-    if others:
-        out += ["[[Other minima]] (error over that of this one)", *(f"    {line}" for line in others)]
+    remarks = words.remarks(d["correlations"], [row["why"] for row in d["unidentified"]], d["notes"], d["minima"])
+    for heading, said in remarks.items():
+        title, space, more = heading.partition(" (")
+        out += [f"[[{title}]]{space}{more}", *(f"    {line}" for line in said)]
     if d["left_out"]:
         out += ["[[Left out]]", f"    {', '.join(d['left_out'])}"]
     parity = d["parity"]
