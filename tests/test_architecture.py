@@ -43,7 +43,7 @@ TOP = [
     {"interchange"},
     {"study"},
     {"report"},
-    {"tabulate", "job", "truth", "structures", "cache"},
+    {"tabulate", "job", "truth", "structures", "stability", "cache"},
     {"batch", "tradeoffs", "specialising"},
     {"demo"},
     {""},

@@ -25,6 +25,7 @@ from layerfit.render import brdf
 COMMANDS = (
     "fit",
     "structures",
+    "batch",
     "advise",
     "render",
     "eval",
@@ -32,6 +33,7 @@ COMMANDS = (
     "verify",
     "truth",
     "tradeoff",
+    "stability",
     "presets",
     "metal",
     "inspect",

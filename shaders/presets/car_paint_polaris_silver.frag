@@ -62,8 +62,8 @@ float lf_v_cavity(vec3 wi, vec3 wo) {
 // Beckmann density of facet normals (Cook and Torrance 1982, eq. 14, normalised).
 float lf_beckmann_d(vec3 h, float alpha) {
     bool above = h.z > 1e-04;
-    float z2 = above ? h.z * h.z : 1.0;
-    return above ? exp(-((h.x * h.x + h.y * h.y) / (alpha * alpha)) / z2) / (3.1415927 * (alpha * alpha) * z2 * z2) : 0.0;
+    float inverse = 1.0 / (above ? h.z * h.z : 1.0);
+    return above ? exp(-((h.x * h.x + h.y * h.y) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha)) : 0.0;
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.

@@ -382,8 +382,8 @@ float lf_tilted_d(vec3 h, vec2 tilt, float alpha) {
     float x = h.x - h.z * tilt.x;
     float y = h.y - h.z * tilt.y;
     bool above = h.z > 1e-04;
-    float z2 = above ? h.z * h.z : 1.0;
-    return above ? exp(-((x * x + y * y) / (alpha * alpha)) / z2) / (3.1415927 * (alpha * alpha) * z2 * z2) : 0.0;
+    float inverse = 1.0 / (above ? h.z * h.z : 1.0);
+    return above ? exp(-((x * x + y * y) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha)) : 0.0;
 }
 
 // NoW (1 + 2 Lambda) of the Beckmann distribution (Heitz 2014, eq. 66, multiplied out).

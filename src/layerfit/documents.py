@@ -4,6 +4,7 @@ import difflib
 import json
 import math
 import os
+import sys
 import tempfile
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -28,7 +29,10 @@ def read_document(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); is it another kind of file?") from None
     try:
         document = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
+        json.dumps(
+            document, ensure_ascii=False, default=str
+        ).encode()  # JSON may spell a half of a character, which no file can hold
+    except ValueError as error:  # of both formats, and of whole numbers of thousands of digits
         raise InputError(f"{path}: not valid {'TOML' if path.suffix == '.toml' else 'JSON'}: {error}") from None
     except RecursionError:
         raise InputError(f"{path}: nested too deeply to be a scene file or a preset") from None
@@ -44,6 +48,11 @@ def finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number that a float can hold: no NaN, no infinity, no whole number of hundreds of digits, no truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

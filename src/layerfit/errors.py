@@ -4,6 +4,13 @@
 class LayerfitError(Exception):
     """Something outside the program is at fault: an input file, an argument or the machine. Exit code 2, no traceback."""
 
+    LONGEST = 2000
+    """Letters of a message: what a file holds is cut out of its middle, the advice at its end is not."""
+
+    def __str__(self) -> str:
+        text, half = super().__str__(), self.LONGEST // 2
+        return text if len(text) <= self.LONGEST else f"{text[:half]} ... {text[-half:]}"
+
 
 class InputError(LayerfitError):
     """A file or an argument cannot be used as it is."""

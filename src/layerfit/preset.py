@@ -6,15 +6,14 @@ are errors that name the nearest known one.
 
 import dataclasses
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 
 from ._fields import Param, given, params
-from .documents import check_keys, nearest, read_document, write_text
+from .documents import check_keys, is_number, nearest, read_document, write_text
 from .errors import InputError
 from .forms import patina, precise
 from .forms.corrected import Corrected
@@ -29,6 +28,10 @@ from .surfaces import BASES, Conductor
 SCHEMA = "layerfit/preset"
 VERSION = 1
 MODELS: dict[str, type] = {"precise": Precise, "corrected": Corrected, "faithful": Faithful}
+MOST_ORDERS = 16
+"""Each is a lobe in the shader; the third stands for all that follow."""
+MOST_COATS = 8
+"""Each is a function in the shader and a trace that grows."""
 FORM_KEYS = ("model", "interface", "options")
 _STACK_KEYS = (*FORM_KEYS, "layers", "base")
 _PRESET_KEYS = ("schema", "version", "name", *WORDS, *_STACK_KEYS, "left_out", "fit")
@@ -107,6 +110,8 @@ def stack_of(document: Mapping[str, Any], where: str) -> Stack:
     layers = document.get("layers", [])
     if not isinstance(layers, Sequence) or isinstance(layers, str):
         raise InputError(f"{where}: layers should be a list, outermost first")
+    if len(layers) > MOST_COATS:
+        raise InputError(f"{where}: {len(layers)} layers over the base are too many; at most {MOST_COATS} are read")
     if "base" not in document:
         raise InputError(f'{where}: there is no base; give one, for example {{"type": "conductor", "alpha": 0.2}}')
     built = tuple(_layer(layer, LAYERS, f"{where}: layers[{k}]") for k, layer in enumerate(layers))
@@ -124,16 +129,17 @@ def form_of(document: Mapping[str, Any], layers: tuple[Any, ...], base: Any, whe
             raise InputError(f"{where}: {problem}")
     in_time = any(kind.grows(layers) for kind in IN_TIME)
     model = document.get("model", "corrected" if in_time or precise.refuses(layers, base) else "precise")
-    if model not in MODELS:
+    if not isinstance(model, str) or model not in MODELS:
         raise InputError(f"{where}: model = {model!r} is not one of {', '.join(MODELS)}{nearest(str(model), MODELS)}")
     reason = patina.form_refuses(layers, MODELS[model]) if in_time else FORMS[MODELS[model]].refuses(layers, base)
     if reason:
         instead = "" if model == "corrected" else '. Use "corrected", which is for all of them'
         raise InputError(f'{where}: model = "{model}" is not for this material: {reason}{instead}')
     form = MODELS[model]
-    options = dict(document.get("options", {}))
+    options = document.get("options", {})
     known = [f.name for f in dataclasses.fields(form) if f.name != "interface"]
     check_keys(options, known, f"{where}: options")
+    options = {key: _option(value, get_type_hints(form)[key], f"{where}: options.{key}") for key, value in options.items()}
     if "interface" in document:
         interface = document["interface"]
         if model != "precise":
@@ -144,6 +150,18 @@ def form_of(document: Mapping[str, Any], layers: tuple[Any, ...], base: Any, whe
             )
         options["interface"] = interface
     return form(**options)
+
+
+def _option(value: Any, kind: Any, where: str) -> Any:
+    """A truth value, one of some words, or a small number, as the form says."""
+    words = get_args(kind)
+    if words and value not in words:
+        raise InputError(f"{where} = {value!r}: should be one of {', '.join(words)}{nearest(str(value), words)}")
+    if kind is bool and not isinstance(value, bool):
+        raise InputError(f"{where} = {value!r}: should be true or false")
+    if kind is int and (not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= MOST_ORDERS):
+        raise InputError(f"{where} = {value!r}: should be a whole number from 0 to {MOST_ORDERS}")
+    return value
 
 
 def _layer(document: Any, kinds: Mapping[str, Any], where: str) -> Any:
@@ -206,7 +224,7 @@ def _named_metal(document: Mapping[str, Any], where: str) -> Mapping[str, Any]:
 
 def _number(value: Any, spec: Param, where: str) -> Any:
     array = np.asarray(value, object)
-    numeric = all(isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v) for v in array.ravel())
+    numeric = all(is_number(v) for v in array.ravel())
     if not numeric or array.shape not in ((), (3,)):
         raise InputError(f"{where} = {value!r}: should be a finite number{' or a list of three' if spec.colour else ''}")
     if array.shape == (3,) and not spec.colour:

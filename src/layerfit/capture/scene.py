@@ -4,19 +4,23 @@
 """
 
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..documents import check_keys, nearest, read_document
+from ..documents import check_keys, is_number, nearest, read_document
 from ..errors import InputError
 from ..preset import FORM_KEYS, form_of, read_preset, stack_of
 from ..stack import Stack
 
 Vector = tuple[float, float, float]
+
+MOST_STARTS = 1000
+"""Of a fit: each takes seconds."""
+LARGEST = 1e15
+"""Number in a scene: beyond it, squares of lengths and light leave float32."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -234,7 +238,9 @@ def _measured(entry: Mapping[str, Any], path: Path, where: str) -> list[Measured
 
 def _thickness_scale(entry: Mapping[str, Any], where: str) -> dict[str, float]:
     scale = entry.get("thickness_scale", {})
-    return {str(k): _positive(v, f"{where}.thickness_scale.{k}") for k, v in dict(scale).items()}
+    if not isinstance(scale, Mapping):
+        raise InputError(f"{where}.thickness_scale = {scale!r}: should be a table of layers")
+    return {str(k): _positive(v, f"{where}.thickness_scale.{k}") for k, v in scale.items()}
 
 
 def _start(material: Any, path: Path) -> Stack:
@@ -270,11 +276,12 @@ def _fit(table: Any, where: str) -> FitRequest:
             )
     if "min_cosine" in values and not 0.0 <= _finite(values["min_cosine"], f"{where}.min_cosine") < 1.0:
         raise InputError(f"{where}.min_cosine = {values['min_cosine']!r}: should be from 0 to below 1")
-    for key in ("starts", "seed"):
-        if key in values and (not isinstance(values[key], int) or values[key] < (1 if key == "starts" else 0)):
-            raise InputError(
-                f"{where}.{key} = {values[key]!r}: should be a whole number{' from 1 up' if key == 'starts' else ''}"
-            )
+    for key, (least, most) in (("starts", (1, MOST_STARTS)), ("seed", (0, 2**63 - 1))):
+        value = values.get(key, least)
+        if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+            raise InputError(f"{where}.{key} = {value!r}: should be a whole number from {least} to {most}")
+    if not isinstance(values.get("fixed", {}), Mapping):
+        raise InputError(f"{where}.fixed = {values['fixed']!r}: should be a table of parameters and their values")
     return FitRequest(**values)
 
 
@@ -308,10 +315,10 @@ def _geometry(table: Any, where: str) -> Sphere:
 
 
 def _light(table: Any, path: Path, where: str) -> Light:
-    if not isinstance(table, Mapping) or table.get("type") not in _LIGHTS:
-        kind = table.get("type") if isinstance(table, Mapping) else table
+    kind = table.get("type") if isinstance(table, Mapping) else table
+    if not isinstance(kind, str) or kind not in _LIGHTS or not isinstance(table, Mapping):
         raise InputError(f"{where}.type = {kind!r}: should be one of {', '.join(_LIGHTS)}{nearest(str(kind), _LIGHTS)}")
-    cls, readers = _LIGHTS[table["type"]]
+    cls, readers = _LIGHTS[kind]
     check_keys(table, ("type", *readers), where)
     needed = {f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING}
     values = {}
@@ -339,8 +346,8 @@ def _text(value: Any, where: str) -> str:
 
 
 def _finite(value: Any, where: str) -> float:
-    if not isinstance(value, (int, float)) or isinstance(value, bool) or not math.isfinite(value):
-        raise InputError(f"{where} = {value!r}: should be a finite number")
+    if not is_number(value) or abs(value) > LARGEST:
+        raise InputError(f"{where} = {value!r}: should be a finite number, at most {LARGEST:g}")
     return float(value)
 
 

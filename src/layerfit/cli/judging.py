@@ -1,4 +1,4 @@
-"""Commands that judge a material: `truth` compares its closed forms with the random walk, `tradeoff` what accuracy costs."""
+"""Commands that judge models: `truth` by the random walk, `tradeoff` what accuracy costs, `stability` float32 at every corner."""
 
 from pathlib import Path
 from typing import Annotated
@@ -83,3 +83,33 @@ def tradeoff(
     say(f"Wrote tradeoff.html, tradeoff.png, tradeoff.csv and tradeoff.json in {output}/")
     if as_json:
         emit(document)
+
+
+@app.command()
+def stability(
+    word: Annotated[
+        str, typer.Argument(help="Part of the name of structures: precise, conductor, patina. Left out: all of them.")
+    ] = "",
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    corners: Annotated[int, typer.Option(min=2, max=65536, help="Corners of the ranges of a structure, at most.")] = 128,
+    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of the corners that are drawn.")] = 0,
+    shaders: Annotated[bool, typer.Option(help="Draw the printed shaders too.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Try every structure at the corners of its ranges and at grazing, normal, mirror and retro directions: do the numbers hold?
+
+    Values and derivatives in float32 are compared with float64, and with the printed shader. Leaves `stability.json`, `stability.md` and a
+    heat map for each structure in the output directory. Exit code 1: something is not finite, jumps, or has lost its digits.
+
+    Example: `layerfit stability lambert -o out/stability`
+    """
+    from ..report.stability import table
+    from ..stability.sweep import stability_of
+
+    with progress() as report:
+        document = stability_of(output, word, corners=corners, shaders=shaders, seed=seed, progress=report)
+    stderr.print(table(document))
+    say(f"Wrote stability.json, stability.md and heat/ in {output}/")
+    if as_json:
+        emit(document)
+    raise typer.Exit(0 if document["good"] else 1)

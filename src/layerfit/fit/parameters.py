@@ -1,7 +1,6 @@
 """Which fields of a material are fitted, in which coordinates, between which bounds."""
 
 import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._fields import Param, params
-from ..documents import nearest
+from ..documents import is_number, nearest
 from ..errors import InputError
 from ..stack import Stack
 
@@ -140,7 +139,7 @@ def with_fixed(stack: Stack, fixed: Mapping[str, Any], where: str) -> Stack:
 
 def _is_number(value: Any, spec: Param) -> bool:
     values = value if isinstance(value, (list, tuple)) and spec.colour and len(value) == 3 else [value]
-    return all(isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v) for v in values)
+    return all(is_number(v) for v in values)
 
 
 def parametrise(stack: Stack, free: Sequence[str] | None, fixed: Sequence[str], where: str) -> tuple[Stack, Parametrisation]:

@@ -59,8 +59,9 @@ def beckmann_by_slopes(stretched_xy2: Scalar, z: Scalar, area: Scalar) -> Scalar
     """Beckmann's density by the squared slope in widths, times z^2, and the product of the widths."""
     # The exponent goes to -infinity at the horizon, where D is 0: the guarded z keeps the derivative finite there.
     above = z > 1e-4
-    z2 = where(above, z * z, 1.0)
-    return where(above, jnp.exp(-stretched_xy2 / z2) / (jnp.pi * area * z2 * z2), 0.0)
+    inverse = 1.0 / where(above, z * z, 1.0)
+    # A factor each, not one divisor: its square, by which a quotient is differentiated, would be 0 in float32 near the horizon.
+    return where(above, jnp.exp(-stretched_xy2 * inverse) * (inverse * inverse) / (jnp.pi * area), 0.0)
 
 
 def density(distribution: Distribution, h: Vec3, alpha: Width) -> Scalar:

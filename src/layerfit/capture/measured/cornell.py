@@ -14,6 +14,8 @@ from ...optics.spectra import covers, resampling, rgb_weights
 from .data import MeasuredBrdf, direction, measured, read_bytes
 
 MOST_WAVELENGTHS = 1000
+LARGEST_ANGLE = 10.0
+"""More than a turn and a half: a file in degrees is not read as if it were one in radians."""
 KIND = "Cornell"
 
 
@@ -21,6 +23,8 @@ def read_cornell(path: Path, illuminant: str = "D65") -> MeasuredBrdf:
     """Read such a file; spectra become linear Rec.709 by the CIE 1931 observer under `illuminant`. Raises `InputError`."""
     text = read_bytes(path).decode("latin-1")
     wavelengths, rows = _numbers(path, text)
+    if not np.all(np.abs(rows[:, :4]) <= LARGEST_ANGLE):
+        raise InputError(f"{path}: an angle is not finite or above {LARGEST_ANGLE:g} rad; is the file damaged?")
     theta_i, phi_i, theta_o, phi_o = rows[:, :4].T
     f = rows[:, 4:] @ (resampling(wavelengths) @ rgb_weights(illuminant))
     layout = {

@@ -13,6 +13,10 @@ from .data import MeasuredBrdf, direction, measured, mirrored
 from .tensor import read_tensors
 
 KIND = "RGL"
+LARGEST = 1e15
+"""Of densities: sums of their squares stay within a double."""
+_RANGES = {"theta_i": (0.0, 1.6), "phi_i": (-6.3, 6.3)}
+"""Of angles: the quarter turn and the turn, as they are rounded."""
 _DIMENSIONS = {"theta_i": 1, "phi_i": 1, "sigma": 2, "ndf": 2, "vndf": 4, "rgb": 5}
 
 
@@ -41,6 +45,11 @@ def _check(path: Path, fields: dict[str, np.ndarray]) -> None:
             raise InputError(f"{path}: is not a BRDF of the RGL database: it has no field {name!r}")
         if fields[name].ndim != dimensions or fields[name].dtype.kind != "f":
             raise InputError(f"{path}: field {name!r} should be {dimensions} dimensions of floating-point numbers")
+        least, most = _RANGES.get(name, (0.0, LARGEST))
+        if name != "rgb" and not np.all((fields[name] >= least) & (fields[name] <= most)):
+            raise InputError(
+                f"{path}: field {name!r} holds numbers that are not from {least:g} to {most:g}; is the file damaged?"
+            )
     slices = (len(fields["phi_i"]), len(fields["theta_i"]))
     if fields["vndf"].shape[:2] != slices or fields["rgb"].shape[:3] != (*slices, 3):
         raise InputError(f"{path}: vndf and rgb should have a table for each of phi_i and theta_i")

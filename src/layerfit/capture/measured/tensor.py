@@ -50,4 +50,8 @@ def _field(path: Path, data: bytes, at: int) -> tuple[str, np.ndarray, int]:
     dtype, size = np.dtype(_TYPES[kind]), math.prod(shape)
     if offset + size * dtype.itemsize > len(data):
         raise InputError(f"{path}: field {name!r} goes on beyond the end of the file; is it whole?")
+    if size == 0 and kind != 1:  # text may be empty
+        raise InputError(f"{path}: field {name!r} is empty ({' x '.join(map(str, shape))}); is the file damaged?")
+    if size == 0:
+        return name, np.zeros(0, dtype), at + 8 * dimensions
     return name, np.frombuffer(data, dtype, size, offset).reshape(shape), at + 8 * dimensions

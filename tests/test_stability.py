@@ -1,0 +1,124 @@
+"""`layerfit stability`: what it tries, that it sees faults, and a few structures at their corners."""
+
+import dataclasses
+import json
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from commands import layerfit
+from layerfit._fields import params
+from layerfit.layers import LAYERS
+from layerfit.render import brdf
+from layerfit.report import stability as report
+from layerfit.stability import limits, measure, sweep
+from layerfit.stability.grid import CLOSE, POLAR_DEG, directions, grid, parameters
+from layerfit.stability.models import structures
+from layerfit.stack import FORMS, Stack
+from layerfit.surfaces import BASES, Lambert
+
+NARROW_BECKMANN = "conductor, distribution beckmann"
+
+
+def test_every_layer_base_form_and_choice_is_tried():
+    tried = structures()
+    stacks = list(tried.values())
+    assert {type(stack.base) for stack in stacks} == set(BASES.values())
+    assert {type(layer) for stack in stacks for layer in stack.layers} == set(LAYERS.values())
+    assert {type(stack.form) for stack in stacks} == set(FORMS)
+    parts = [part for stack in stacks for part in (*stack.layers, stack.base)]
+    for cls in (*BASES.values(), *LAYERS.values()):
+        own = [part for part in parts if type(part) is cls]
+        for name, _ in params(cls):
+            assert any(getattr(part, name) is not None for part in own), (cls, name)
+        for field in dataclasses.fields(cls):
+            assert {getattr(part, field.name) for part in own} >= set(field.metadata.get("choices", ())), (cls, field.name)
+
+
+def test_a_grid_holds_the_ends_of_all_ranges_and_what_is_close_to_them():
+    stack = structures()["corrected, coat over lambert"]
+    tried = grid(stack, corners=256)
+    free = parameters(stack)
+    assert [f.name for f in free] == ["coat.alpha", "coat.eta", "coat.tau", "base.albedo"]
+    ends = np.array([(f.spec.lower, f.spec.upper) for f in free])
+    corners = tried.values[:16]
+    assert len(np.unique(corners, axis=0)) == 16
+    assert np.all((corners == ends[:, 0]) | (corners == ends[:, 1]))
+    index = tried.values[tried.lines["coat.eta"], 1]
+    assert (index[0], index[-1]) == (1.0, 3.0)
+    np.testing.assert_allclose(index[1:4], 1.0 + 2.0 * np.array(CLOSE))
+    assert np.all(np.diff(index) > 0.0)
+    few = grid(stack, corners=5).values[:5]
+    np.testing.assert_array_equal(few[:2], ends.T)
+
+
+def test_directions_are_unit_vectors_above_the_surface():
+    wi, wo, place = directions()
+    np.testing.assert_allclose(np.linalg.norm([wi, wo], axis=-1), 1.0, rtol=1e-15)
+    assert min(wi[:, 2].min(), wo[:, 2].min()) > 1e-4
+    np.testing.assert_allclose(np.degrees(np.arccos(wi[:, 2])), np.array(POLAR_DEG)[place], atol=1e-5)
+    assert any(np.array_equal(i, o) for i, o in zip(wi, wo, strict=True)), "retro"
+
+
+@pytest.fixture(scope="module")
+def beckmann(gl):
+    return sweep.try_structure(NARROW_BECKMANN, structures()[NARROW_BECKMANN], corners=8)
+
+
+def test_narrow_gaussian_facets_hold_near_the_horizon(beckmann):
+    """The square of a divisor was 0 in float32: derivatives were NaN where half vectors graze and facets are narrow."""
+    assert beckmann["not_finite"] == 0
+    assert beckmann["value_rel"]["max"] < 1e-5
+    assert beckmann["slope_rel"]["p999"] < 1e-3
+    assert beckmann["breaks"] == []
+    assert beckmann["shader"]["not_finite"] == 0
+    assert beckmann["shader"]["max_rel"] < 5e-5
+    assert beckmann["good"]
+
+
+def test_the_worst_cases_reproduce(beckmann):
+    case = beckmann["worst"][0]
+    values = {name.partition(".")[2]: np.float32(value) for name, value in case["parameters"].items()}
+    stack = Stack((), BASES["conductor"](distribution="beckmann", **values))
+    with jax.enable_x64(False):
+        value = float(brdf(stack, *(jnp.asarray([case[key]], np.float32) for key in ("wi", "wo")))[0, 0])
+    assert value == pytest.approx(case["float32"], rel=1e-6)
+
+
+def test_what_jumps_or_turns_is_told():
+    tried = grid(Stack((), Lambert()), corners=2)
+    albedo = tried.values[:, 0]
+
+    def of(f):
+        values = measure.Values(f[:, None], np.zeros((3, len(f), 1)), [])
+        return [told["kind"] for told in limits.breaks(tried, values)]
+
+    assert of(albedo / np.pi) == []
+    assert of(np.where(albedo > 0.0, 1.0 + albedo, 0.0)) == ["jump"]
+    assert of(albedo * (1.2 - albedo)) == ["not monotone"]
+
+
+def test_what_is_not_finite_is_an_infinite_error():
+    whole = measure.Values(np.ones((1, 2)), np.zeros((3, 1, 2)), [])
+    broken = dataclasses.replace(whole, f=np.array([[1.0, np.nan]]))
+    np.testing.assert_array_equal(measure.value_error(broken, whole), [[0.0, np.inf]])
+
+
+def test_the_command_leaves_tables_and_maps(gl, tmp_path):
+    ran = layerfit("stability", "kubelka_munk, whole", "-o", tmp_path, "--corners", "4")
+    assert ran.code == 0, ran.err
+    document = json.loads((tmp_path / "stability.json").read_text())
+    (entry,) = document["structures"]
+    assert document["combinations"] == entry["materials"] * len(directions()[0])
+    assert "none of the structures with findings" in " ".join(ran.err.split())
+    assert (tmp_path / "stability.md").read_text().startswith(report.sentence(document))
+    assert (tmp_path / "heat" / "kubelka_munk_whole.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_structure_that_is_not_there(tmp_path):
+    ran = layerfit("stability", "granite", "-o", tmp_path / "out")
+    assert (ran.code, ran.out) == (2, "")
+    assert "no structure has 'granite' in its name" in ran.err
+    assert not (tmp_path / "out").exists()
