@@ -1,5 +1,6 @@
 """Linear radiance of a material at samples: the sum over light samples of BRDF times weight."""
 
+from collections import deque
 from functools import partial
 from typing import Any
 
@@ -64,6 +65,8 @@ def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any, place: Any) 
 
 _shaded = Compiled(shade)
 _BLOCK = 1024
+_AHEAD = 16
+"""Blocks that are begun before the first is waited for: what cores there are work side by side, and none waits for the next to be handed over."""
 _LIGHTS = 512
 """Light samples that are summed at once: the quadratures of a fit and of its pictures then share one executable."""
 
@@ -86,7 +89,12 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, pl
         weight = np.pad(weight, ((0, 0), (0, missing), (0, 0)))
     stack = stack.astype(np.float32)
     place = narrowed(place, stack.reads)
-    rows = []
+    rows: list[np.ndarray] = []
+    begun: deque[list[Any]] = deque()
+
+    def finish() -> None:
+        rows.append(np.sum([np.asarray(part) for part in begun.popleft()], 0).T)
+
     with jax.enable_x64(False):
         made = prepared(stack)
         for start in range(0, len(wo), size):
@@ -94,9 +102,13 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, pl
             bright = np.moveaxis(bright, -1, 0)
             there = jax.tree.map(lambda a, start=start: _padded(a[start : start + size], size), place)
             lights = [slice(light, light + each) for light in range(0, pieces * each, each)]
-            # All are started before the first is waited for.
-            sums = [_shaded(made, to_light[:, some], to_eye, bright[:, :, some], there, form=stack.form) for some in lights]
-            rows.append(np.sum([np.asarray(part) for part in sums], 0).T)
+            begun.append(
+                [_shaded(made, to_light[:, some], to_eye, bright[:, :, some], there, form=stack.form) for some in lights]
+            )
+            if len(begun) > _AHEAD:
+                finish()
+        while begun:
+            finish()
     return np.concatenate(rows)[: len(wo)]
 
 
