@@ -60,7 +60,8 @@ def _check(path: Path, fields: dict[str, np.ndarray]) -> None:
 def _slice(fields: dict[str, np.ndarray], p: int, t: int, isotropic: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """wi, wo and f (n, 3) of the points of one table, that of one direction of light."""
     theta_i, phi_i = float(fields["theta_i"][t]), float(fields["phi_i"][p])
-    values = fields["rgb"][p, t].astype(float)
+    with np.errstate(invalid="ignore"):  # a NaN that signals is one that is left out, as any other
+        values = fields["rgb"][p, t].astype(float)
     height, width = values.shape[1:]
     v, u = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, height), np.linspace(0, 1, width), indexing="ij"))
     # Across the table runs the polar angle of the half vector, down it the azimuth.
