@@ -43,7 +43,7 @@ TOP = [
     {"interchange"},
     {"study"},
     {"report"},
-    {"tabulate", "job", "truth", "structures", "stability", "cache"},
+    {"tabulate", "job", "truth", "structures", "stability", "cache", "view"},
     {"batch", "tradeoffs", "specialising"},
     {"demo"},
     {""},

@@ -2,23 +2,32 @@
 
 import dataclasses
 import json
+from queue import Queue
+from threading import Thread
+from urllib.error import HTTPError
+from urllib.request import urlopen
 
 import jax
 import numpy as np
 import pytest
+from gallery import same
 
 from browser import chromium, opened, until
+from commands import layerfit
 from helpers import APPROXIMATE, STACKS
+from layerfit import view
 from layerfit.fit.metrics import display
 from layerfit.preset import read_preset, stack_of
 from layerfit.report import pages
 from layerfit.report.comparison import Pair
+from layerfit.report.gallery import for_web
 from layerfit.report.html import page as report_page
 from layerfit.report.viewer import live
 from layerfit.shader.export import print_material
 from layerfit.shader.gl import shade_points
 from layerfit.shader.program import program
 from layerfit.shader.verify import check_pairs
+from layerfit.shipped import shipped_presets
 from layerfit.stack import Stack, prepared
 from test_report import DOCUMENT
 
@@ -232,3 +241,47 @@ def test_programs_compute_what_jax_computes(browser, tmp_path):
                 got, np.ravel(want), rtol=0.0, atol=CONSTANTS * max(np.abs(want).max(), 1.0), err_msg=name
             )
     page.close()
+
+
+def test_a_gallery_draws_every_preset_that_is_in_sight(browser, tmp_path):
+    """With the shaders that lie beside them, which are what is printed for the web but for the first lines."""
+    ran = layerfit("gallery", "lacquered", "-o", tmp_path / "all")
+    assert ran.code == 0
+    found = shipped_presets("lacquered")
+    assert f"{len(found)} materials" in ran.err
+    printed = print_material(read_preset(found[0].path), found[0].name).text("essl300")
+    assert same(for_web(found[0].path.with_suffix(".frag").read_text()), printed)
+    with opened(browser, (tmp_path / "all" / "index.html").as_uri()) as page:
+        page.evaluate(
+            "layerfit.views.forEach((view) => { view.limit = 1; view.canvas.style.width = view.canvas.style.height = '40px'; })"
+        )
+        assert page.evaluate("layerfit.views.length") == len(found)
+        until(page, "layerfit.views.slice(0, 3).every((view) => view.passes > 0)")
+        middle = "(v) => Array.from(v.context.getImageData(v.canvas.width >> 1, v.canvas.height >> 1, 1, 1).data)"
+        drawn = evaluated(page, f"() => layerfit.views.slice(0, 3).map({middle})")
+        assert all(pixel[3] == 255 and max(pixel[:3]) > 8 for pixel in drawn)
+        assert len({tuple(pixel) for pixel in drawn}) == 3
+        page.get_by_label("find materials").fill("copper")
+        shown = page.locator(".tile:visible h3").all_inner_texts()
+        assert shown == [preset.name for preset in found if "copper" in f"{preset.name} {preset.description}"]
+
+
+def test_a_preset_is_served_to_this_machine_alone(browser):
+    """And tuned there; what is not the page is not found."""
+    places = Queue()
+    text = view.page(read_preset("bare_concrete"), "bare_concrete")
+    Thread(target=view.serve, args=(text, places.put, False), daemon=True).start()
+    address = places.get(timeout=10.0)
+    assert address.startswith("http://127.0.0.1:")
+    with pytest.raises(HTTPError, match="404"):
+        urlopen(f"{address}etc/passwd")
+    with opened(browser, address) as page:
+        page.evaluate("layerfit.views[0].limit = 1")
+        assert page.locator("fieldset legend").all_inner_texts() == ["concrete"]
+        assert page.locator(".sigma").count() == 0
+
+
+def test_a_view_can_be_a_file(tmp_path):
+    ran = layerfit("view", "bare_concrete", "-o", tmp_path / "concrete.html")
+    assert ran.code == 0
+    assert (tmp_path / "concrete.html").read_text().startswith("<!doctype html>")

@@ -2,7 +2,7 @@
 
 import itertools
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -22,12 +22,7 @@ def presets(
 
     Example: `layerfit presets copper`
     """
-    from ..errors import InputError
-    from ..shipped import shipped_presets
-
-    found = shipped_presets(word)
-    if not found:
-        raise InputError(f"no shipped preset has {word!r} in its name or description; `layerfit presets` lists all of them")
+    found = _found(word)
     if as_json:
         emit([{**vars(preset), "path": str(preset.path)} for preset in found])
         return
@@ -36,6 +31,37 @@ def presets(
         typer.echo(group)
         for preset in members:
             typer.echo(f"  {preset.name:<{width}}  {preset.description}")
+
+
+def _found(word: str) -> list[Any]:
+    from ..errors import InputError
+    from ..shipped import shipped_presets
+
+    if found := shipped_presets(word):
+        return found
+    raise InputError(f"no shipped preset has {word!r} in its name or description; `layerfit presets` lists all of them")
+
+
+@app.command()
+def gallery(
+    word: Annotated[str, typer.Argument(help="Part of a name, group, structure or description. Left out: all of them.")] = "",
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the page.")] = Path("out/gallery"),
+) -> None:
+    """Show the presets that ship as a page of live previews, drawn by their shaders.
+
+    Leaves `index.html` in the output directory: one file that makes no request.
+
+    Example: `layerfit gallery wood -o out/gallery`
+    """
+    from ..documents import check_directory, write_text
+    from ..report.gallery import page
+
+    found = _found(word)
+    check_directory(output)
+    write_text(output / "index.html", page(found))
+    say(
+        f"Wrote {output / 'index.html'}: {len(found)} materials; open it in a browser, and one of them with `layerfit view {found[0].name}`"
+    )
 
 
 @app.command()

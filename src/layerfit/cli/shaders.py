@@ -71,3 +71,30 @@ def verify(
     if as_json:
         emit(document)
     raise typer.Exit(0 if document["passed"] else 1)
+
+
+@app.command()
+def view(
+    preset: Preset,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the page to this HTML file instead.")] = None,
+    open_browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
+) -> None:
+    """Look at a preset live and tune it: its exported shader in the browser, with a slider for every parameter.
+
+    The page is served to this machine alone, until Ctrl+C; with `-o` it is a file to keep or to send. It can save the tuned preset.
+
+    Example: `layerfit view lacquered_copper`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..documents import write_text
+    from ..preset import read_preset
+    from ..view import page, serve
+
+    text = page(read_preset(preset), preset.stem)
+    if output is not None:
+        write_text(output, text)
+        say(f"Wrote {output}; open it in a browser")
+        return
+    serve(text, lambda address: say(f"{preset.stem} is at {address} (Ctrl+C ends)"), open_browser)

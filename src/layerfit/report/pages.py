@@ -13,7 +13,7 @@ from string import Template
 from typing import Any
 
 FOLDER = Path(__file__).parent / "page"
-SCRIPTS = ("program.js", "shapes.js", "renderer.js", "view.js", "controls.js", "compare.js", "page.js")
+SCRIPTS = ("program.js", "shapes.js", "renderer.js", "view.js", "controls.js", "compare.js", "gallery.js", "page.js")
 
 
 def text(name: str) -> str:

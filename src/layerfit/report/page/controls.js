@@ -20,35 +20,41 @@ function scaleOf({ scale, soft, lower, upper }) {
   };
 }
 
+const TONES = ["none", "neutral", "filmic"];
 const STEP = 0.08;  // radians for an arrow key
 
-function turned(angles, dx, dy) {
+function turn(angles, dx, dy) {
   angles.yaw += dx;
   angles.pitch = clamp(angles.pitch + dy, -1.5, 1.5);
 }
 
+// Calls `move(dx, dy, shift)`, in pixels, when an element is dragged or arrow keys are pressed on it.
+function turned(target, move) {
+  target.addEventListener("pointerdown", (event) => {
+    target.setPointerCapture(event.pointerId);
+    target.onpointermove = ({ movementX, movementY, shiftKey }) => move(movementX, movementY, shiftKey);
+  });
+  for (const end of ["pointerup", "pointercancel"]) target.addEventListener(end, () => { target.onpointermove = null; });
+  target.addEventListener("keydown", (event) => {
+    const [x, y] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key] ?? [0, 0];
+    if (!x && !y) return;
+    event.preventDefault();
+    move(100 * STEP * x, 100 * STEP * y, event.shiftKey);
+  });
+}
+
 // Drag, arrow keys and wheel turn the view; the same on the mark of the light move the light.
 function turning(view, sun) {
-  const act = (target, move) => {
-    target.addEventListener("pointerdown", (event) => {
-      target.setPointerCapture(event.pointerId);
-      target.onpointermove = (to) => {
-        move(to.movementX, to.movementY, to.shiftKey);
-        view.change();
-      };
-    });
-    for (const end of ["pointerup", "pointercancel"]) target.addEventListener(end, () => { target.onpointermove = null; });
-    target.addEventListener("keydown", (event) => {
-      const [x, y] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key] ?? [0, 0];
-      if (!x && !y) return;
-      event.preventDefault();
-      move(100 * STEP * x, 100 * STEP * y, event.shiftKey);
-      view.change();
-    });
+  const light = (dx, dy) => {
+    turn(view.light, dx / 100, -dy / 100);
+    view.change();
   };
-  const light = (dx, dy) => turned(view.light, dx / 100, -dy / 100);
-  act(view.canvas, (dx, dy, shift) => (shift ? light(dx, dy) : turned(view.orbit, -dx / 100, dy / 100)));
-  act(sun, light);
+  turned(sun, light);
+  turned(view.canvas, (dx, dy, shift) => {
+    if (shift) return light(dx, dy);
+    turn(view.orbit, -dx / 100, dy / 100);
+    return view.change();
+  });
   const nearer = (by) => {
     view.orbit.distance = clamp(view.orbit.distance * by, 2.6, 12);
     view.change();
@@ -170,7 +176,7 @@ function viewer(place, renderer, data) {
   const shapes = Object.keys(SHAPES);
   const look = element("div", { className: "look" },
     choice("shape", shapes, (k) => view.change({ shape: shapes[k] })),
-    choice("tone", ["none", "neutral", "filmic"], (k) => { view.tone = k; view.present(); }),
+    choice("tone", TONES, (k) => { view.tone = k; view.present(); }),
     range("exposure", -4, 4, 0, (x) => { view.exposure = x; view.present(); }),
     range("key light", 0, 3, 1, (x) => { view.shares.key = x; view.change(); }),
     range("soft boxes", 0, 3, 1, (x) => { view.shares.studio = x; view.change(); }),

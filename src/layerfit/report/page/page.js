@@ -15,12 +15,16 @@ async function start() {
     const data = JSON.parse(place.dataset.compare);
     compare(place, data, await unpacked(data.pixels));
   }
-  const places = document.querySelectorAll("[data-viewer]");
+  const places = document.querySelectorAll("[data-viewer], [data-gallery]");
   try {
     const renderer = places.length ? new Renderer() : null;
-    for (const place of places) page.views.push(viewer(place, renderer, await readDocument(place.dataset.viewer)));
+    for (const place of places) {
+      const { viewer: one, gallery: many } = place.dataset;
+      if (one) page.views.push(viewer(place, renderer, await readDocument(one)));
+      else page.views.push(...gallery(place, renderer, await readDocument(many)));
+    }
   } catch (error) {
-    for (const place of places) place.textContent = `There is no live view here: ${error.message}.`;
+    for (const place of places) place.prepend(`There is no live view here: ${error.message}.`);
     throw error;
   }
   run(page.views);

@@ -8,13 +8,15 @@ const STUDIO = [
 ];
 const KEY = { size: 0.035, irradiance: 2.2 };
 const PASSES = 768;
+const FRAME_MS = 40;
 
 class View {
   constructor(renderer, canvas, fragment, values) {
     this.renderer = renderer;
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
-    this.material = renderer.material(fragment);
+    this.fragment = fragment;
+    this.material = null;  // compiled when it is first drawn
     this.values = values;
     this.shape = "sphere";
     this.orbit = { yaw: 0, pitch: 0.17, distance: 5 };
@@ -69,6 +71,7 @@ class View {
   }
 
   frame() {
+    this.material ??= this.renderer.material(this.fragment);
     this.resize();
     const { width, height } = this.canvas;
     const { yaw, pitch, distance } = this.orbit;
@@ -95,6 +98,7 @@ class View {
 
   // One pass of given lights at a given size, as linear numbers: what a test compares with another driver.
   snapshot(width, height, lights) {
+    this.material ??= this.renderer.material(this.fragment);
     const target = this.renderer.target(width, height, true);
     const { yaw, pitch, distance } = this.orbit;
     const seen = camera(yaw, pitch, distance, width, height);
@@ -120,8 +124,10 @@ function run(views) {
   const frame = (now) => {
     const waited = now - before;
     before = now;
-    for (const view of views) {
-      if (!view.visible || (view.passes >= view.limit && view.pass)) continue;
+    const due = views.filter((view) => view.visible && (view.passes < view.limit || !view.pass));
+    due.sort((a, b) => a.passes - b.passes);
+    for (const view of due) {
+      if (performance.now() - now > FRAME_MS) break;  // compiling shaders takes long: one or a few a frame
       view.atOnce = Math.min(Math.max(waited < 24 ? view.atOnce + 1 : view.atOnce >> 1, 1), 8);
       if (waited > 250 && view.passes > 0 && view.passes < 3) view.fineness = Math.max(view.fineness / 2, 0.25);  // no GPU
       view.frame();
