@@ -34,6 +34,7 @@ COMMANDS = (
     "view",
     "truth",
     "tradeoff",
+    "specialise",
     "stability",
     "presets",
     "gallery",

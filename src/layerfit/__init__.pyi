@@ -40,6 +40,7 @@ from .shader.verify import (
     shade_samples as shade_samples,
 )
 from .shipped import Shipped as Shipped, shipped_presets as shipped_presets
+from .specialising import specialise as specialise
 from .stack import Stack as Stack
 from .structures import structures_of as structures_of
 from .surfaces import (

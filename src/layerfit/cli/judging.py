@@ -1,11 +1,12 @@
-"""Commands that judge models: `truth` by the random walk, `tradeoff` what accuracy costs, `stability` float32 at every corner."""
+"""Commands that judge models: `truth` by the random walk, `tradeoff` what accuracy costs, `specialise` what a scene does not need,
+`stability` float32 at every corner."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .app import Json, Preset, app, emit, progress, say, stderr
+from .app import Json, Preset, Scene, app, emit, progress, say, stderr
 
 
 @app.command()
@@ -83,6 +84,48 @@ def tradeoff(
     say(f"Wrote tradeoff.html, tradeoff.png, tradeoff.csv and tradeoff.json in {output}/")
     if as_json:
         emit(document)
+
+
+def _part(text: str) -> float:
+    """0.005, or 0.5%."""
+    try:
+        return float(text[:-1]) / 100.0 if text.endswith("%") else float(text)
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is not a part, such as 0.5% or 0.005") from None
+
+
+@app.command()
+def specialise(
+    preset: Preset,
+    scene: Scene,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    tolerance: Annotated[
+        float, typer.Option(parser=_part, metavar="PART", help="By how much the error of the image may grow: 0.5% or 0.005.")
+    ] = 0.005,
+    as_json: Json = False,
+) -> None:
+    """Leave out what one scene does not need of a material: part by part, the rest fitted again.
+
+    Leaves `preset.json`, `material.frag`, `specialise.json` and `specialise.html` in the output directory. Exit code 1: the
+    shader is not the material.
+
+    Example: `layerfit specialise lacquered_copper examples/references/lacquered_copper.toml --tolerance 0.5% -o out/copper`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..report.specialise import table
+    from ..specialising import specialise as reduce
+
+    with progress() as report:
+        document = reduce(preset, scene, output, tolerance=tolerance, progress=report)
+    stderr.print(table(document))
+    for sentence in document["in_words"]:
+        say(sentence)
+    say(f"Wrote preset.json, material.frag, specialise.html and specialise.json in {output}/")
+    if as_json:
+        emit(document)
+    raise typer.Exit(0 if document["parity"]["passed"] else 1)
 
 
 @app.command()

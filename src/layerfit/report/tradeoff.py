@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import pages
-from .html import figure
+from .html import figure, table
 from .scatter import Panel, Point, scatter
 from .truth import percent
 
@@ -145,14 +145,9 @@ def page(document: Mapping[str, Any], drawing: bytes) -> str:
 {"".join(f"<p>{html.escape(sentence)}</p>" for sentence in document["in_words"])}
 {figure(drawing, "error against run time", "Both scales are logarithmic. Amber: nothing that is cheaper is as near.")}
 <h2>Shaders</h2>
-{_html_table(_TIERS, [tier_cells(row) for row in document["tiers"]])}
+{table(_TIERS, [tier_cells(row) for row in document["tiers"]])}
 <p class=soft>Time over that of Phong in the same round: median of {document["rounds"]} rounds, and its quartiles. Instructions of SPIR-V after
 spirv-opt -O ({html.escape(document["counted_by"])}); Phong has {phong}, and {per_light} for each further light.
 Max, p99.9 and RMS are relative, over random and extreme pairs of directions, delta E 2000 over pixels, against the material itself.</p>
-{"<h2>Fits</h2>" + _html_table(_FITS, fitted) if fitted else ""}"""
+{"<h2>Fits</h2>" + table(_FITS, fitted) if fitted else ""}"""
     return pages.page(title, body)
-
-
-def _html_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    line = lambda cells, kind: "<tr>" + "".join(f"<{kind}>{html.escape(cell)}</{kind}>" for cell in cells) + "</tr>"  # noqa: E731
-    return f"<table>{line(headings, 'th')}{''.join(line(row, 'td') for row in rows)}</table>"

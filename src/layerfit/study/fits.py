@@ -80,7 +80,8 @@ def runs(task: Task) -> Iterator[tuple[str, Callable[[], dict[str, Any]]]]:
             yield name, lambda solver=solver, precision=precision: _solved(task, solver, precision)
 
 
-def _thinned(view: AnyView, pixels: int) -> AnyView:
+def thinned(view: AnyView, pixels: int) -> AnyView:
+    """So many of the pixels of a reference, stratified by half angle."""
     if len(view.index) <= pixels:
         return view
     return view.some(np.sort(stratified(view.samples(quadrature=1), 0)[:pixels]))
@@ -88,7 +89,7 @@ def _thinned(view: AnyView, pixels: int) -> AnyView:
 
 def _fitted(task: Task, pixels: int, starts: int) -> dict[str, Any]:
     """A fit as the command makes it; timed when all is compiled."""
-    views = [_thinned(view, max(32, pixels // len(task.views))) for view in task.views]
+    views = [thinned(view, max(32, pixels // len(task.views))) for view in task.views]
 
     def run() -> Any:
         return fit(views, task.start, free=task.free, fixed=task.fixed, starts=starts, where="tradeoff")
@@ -121,7 +122,7 @@ def _solved(task: Task, solver: str, precision: str) -> dict[str, Any]:
     with jax.enable_x64(True):
         start, named = parametrise(task.start, task.free, tuple(task.fixed), "tradeoff")
         start = start.astype(dtype)
-        views = [_thinned(view, max(32, SOLVER_PIXELS // len(task.views))) for view in task.views]
+        views = [thinned(view, max(32, SOLVER_PIXELS // len(task.views))) for view in task.views]
         samples = [view.samples() for view in views]
         blocks, layout = arrange(samples, None, 0, start.needs)
         weights = [inverse_sigma(s.target, s.target, None, "law") for s in samples]

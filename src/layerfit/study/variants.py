@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any
 
+from .._fields import given
 from ..forms.corrected import Corrected
 from ..preset import MODELS, model_name
 from ..shader.export import print_material
@@ -44,7 +45,8 @@ def with_fresnel(stack: Stack, kind: str) -> Stack | None:
     """The material with all reflectances approximate that its form lets be; None where there are none."""
 
     def changed(layer: Any) -> Any:
-        return dataclasses.replace(layer, fresnel=kind) if getattr(layer, "fresnel", None) == "exact" else layer
+        chosen = "fresnel" in given(type(layer)) and layer.fresnel == "exact"
+        return dataclasses.replace(layer, fresnel=kind) if chosen else layer
 
     # The tables of the precise form were made with the exact reflectance of a coat: there its base alone is approximate.
     layers, base = tuple(changed(layer) for layer in stack.layers), changed(stack.base)
