@@ -24,5 +24,10 @@ void main() {
 //@ if sky
     float sky = v_sky;
 //@ end
+//@ if cosines
+    vec2 lean = v_wi.xy + v_wo.xy;
+    color = vec4(lf_shade(v_wi.z, v_wo.z, dot(lean, lean)) * v_weight, 1.0);
+//@ else
     color = vec4(lf_evaluate(v_wi, v_wo@THERE@) * v_weight, 1.0);
+//@ end
 }

@@ -12,13 +12,14 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "layerfit"
 
 LADDER = [
-    {"errors", "documents", "_data", "_types", "_chunk", "_compiled", "_fields", "_place"},
+    {"errors", "documents", "_data", "_types", "_chunk", "_compiled", "_fields", "_place", "_directions"},
     {"optics"},
     {"surfaces"},
     {"layers"},
     {"forms"},
     {"stack"},
     {"render"},
+    {"tiers"},
     {"materials"},
     {"shipped"},
     {"preset"},
@@ -35,6 +36,7 @@ BRANCHES = [
         {"shader.export", "shader.program"},
         {"shader.gl"},
         {"shader.verify", "shader.cost"},
+        {"shader.choose"},
     ],
 ]
 """Two ladders that stand on the first and never import each other."""

@@ -32,6 +32,7 @@ from .optics.metals import Metal as Metal, metal as metal
 from .optics.spectra import Absorption as Absorption, absorption_rgb as absorption_rgb
 from .preset import read_preset as read_preset, write_preset as write_preset
 from .render import brdf as brdf, predict as predict, radiance as radiance
+from .shader.choose import Choice as Choice, choose_tier as choose_tier
 from .shader.export import Shader as Shader, print_material as print_material
 from .shader.verify import (
     Parity as Parity,
@@ -60,3 +61,4 @@ from .surfaces import (
 from .tradeoffs import tradeoff as tradeoff
 
 __version__: str
+from .tiers.tier import Tier as Tier, make_tier as make_tier

@@ -86,6 +86,24 @@ def dot(a: jax.Array, b: jax.Array) -> jax.Array:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+@jax.jit
+def vec2(x: jax.Array) -> jax.Array:
+    """Twice the same number, GLSL's `vec2`: for arithmetic that fuses a product with a sum where both are vectors."""
+    return jnp.full(2, x)
+
+
+@jax.jit
+def vec3(x: jax.Array) -> jax.Array:
+    """Likewise."""
+    return jnp.full(3, x)
+
+
+@jax.jit
+def vec4(x: jax.Array) -> jax.Array:
+    """Likewise."""
+    return jnp.full(4, x)
+
+
 def where(condition: Any, x: Any, y: Any) -> jax.Array:
     """`jnp.where`, but no function of its own: compiled code keeps calls, and one for each choice costs more than the choice."""
     shape = jnp.broadcast_shapes(jnp.shape(condition), jnp.shape(x), jnp.shape(y))

@@ -46,6 +46,8 @@ def shade(prepared: Any, wi: Any, wo: Any, weight: Any, place: Any = None, *, fo
 
     No channel depends on another: what they share is computed once, and the loops of the compiled code run over pixels.
     """
+    if getattr(prepared, "by_cosines", False):  # its curves hold the channels together
+        return jax.vmap(lambda *pixel: _pixel(form, prepared, *pixel), out_axes=1)(wi, wo, jnp.moveaxis(weight, 0, -1), place)
     colours = jax.tree.map(lambda value: 0 if jnp.shape(value) == (3,) else None, prepared)
 
     def channel(prepared: Any, weight: Any) -> Any:
@@ -60,7 +62,7 @@ def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any, place: Any) 
     prepared = at(prepared, place)
     if wi.shape[0] == 1:  # one light needs no axis: the compiler would carry it through every intermediate value
         return evaluate(form, prepared, wi[0], wo) * weight[0]
-    return jnp.sum(jax.vmap(lambda w: evaluate(form, prepared, w, wo))(wi) * weight)
+    return jnp.sum(jax.vmap(lambda w: evaluate(form, prepared, w, wo))(wi) * weight, 0)
 
 
 _shaded = Compiled(shade)

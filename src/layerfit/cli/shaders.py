@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -16,6 +16,13 @@ def export(
     uniforms: Annotated[
         bool, typer.Option("--uniforms", help="Parameters as uniforms, for live tuning, not as constants.")
     ] = False,
+    tier: Annotated[str | None, typer.Option(help="exact (the default), compact, lazanyi, schlick or faithful.")] = None,
+    max_error: Annotated[
+        float | None, typer.Option(help="Relative error against the exact form that is allowed: takes the cheapest tier.")
+    ] = None,
+    max_cost: Annotated[
+        float | None, typer.Option(help="Instructions in times of Phong: takes the nearest tier within.")
+    ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Shader to write; left out, standard output.")] = None,
 ) -> None:
     """Print the shader of a preset.
@@ -29,12 +36,37 @@ def export(
 
     if target not in HEADERS:
         raise InputError(f"--target {target}: should be one of {', '.join(HEADERS)}{nearest(target, HEADERS)}")
-    text = print_material(read_preset(preset), preset.stem, uniforms).text(target)
+    stack = read_preset(preset)
+    asked = tier is not None or max_error is not None or max_cost is not None
+    if uniforms and asked:
+        raise InputError("--uniforms goes with the exact form alone: leave out --tier, --max-error and --max-cost")
+    if asked:
+        shader, told = _tier(stack, preset.stem, tier, max_error, max_cost)
+        say(told)
+    else:
+        shader = print_material(stack, preset.stem, uniforms)
+    text = shader.text(target)
     if output is None:
         sys.stdout.write(text)
     else:
         write_text(output, text)
         say(f"Wrote {output}")
+
+
+def _tier(stack: Any, name: str, tier: str | None, max_error: float | None, max_cost: float | None) -> Any:
+    """The shader of the tier that is asked for, and what is said of it."""
+    from ..errors import InputError
+    from ..shader.choose import choose_tier
+    from ..shader.export import print_material
+    from ..tiers.tier import make_tier
+
+    if tier is None:
+        choice = choose_tier(stack, name, max_error, max_cost)
+        return choice.shader, str(choice)
+    if max_cost is not None:
+        raise InputError("--max-cost chooses a tier: leave out --tier")
+    made = make_tier(stack, cast(Any, tier), max_error)
+    return print_material(made.stack, name), f"{made.name}: within {made.error:.1e} of the exact form"
 
 
 @app.command()

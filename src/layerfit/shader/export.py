@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import __version__
-from .._chunk import CHUNKS
+from .._chunk import CHUNKS, where
 from .._data import shaders
 from .._fields import params
 from .._place import TANGENT, Place, needs_tangent
@@ -24,6 +24,8 @@ from .printer import PREFIX, Printer, named_leaves
 
 SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ()), "sky": ("float", ())}
 """What a material may read of a place: its type in the shader and in JAX."""
+
+COSINES = "cosines"
 
 HEADERS = {
     "glsl330": "#version 330 core",
@@ -46,8 +48,7 @@ class Shader:
     @property
     def asks(self) -> frozenset[str]:
         """What the BRDF asks for beside a normal and two directions: a tangent, texture coordinates, a distance, a share of the sky."""
-        tangent = any(needs_tangent(layer) for layer in (*self.stack.layers, self.stack.base))
-        return frozenset(self.stack.reads) | ({TANGENT} if tangent else set())
+        return asks(self.stack)
 
     def text(self, target: str = "glsl330", file: str = "material.frag") -> str:
         """The whole fragment shader: a template of `shaders/` with this material in its slots."""
@@ -62,6 +63,8 @@ class Shader:
         return re.sub(r"^//@ (\w+)$", lambda slot: slots[slot[1]].rstrip("\n"), text, flags=re.M)
 
     def _about(self) -> str:
+        if note := getattr(self.stack.base, "note", ""):
+            return f"// {self.name}.\n// Printed by layerfit {__version__}. {note}"
         layers = " over ".join(type(layer).__name__ for layer in (*self.stack.layers, self.stack.base))
         lines = [
             f"{self.name}: {layers}.",
@@ -76,6 +79,14 @@ class Shader:
             lines += ["Indices of refraction are relative to the layer above: its own index divides those in the preset."]
         lines += approximations(self.stack)
         return "\n".join(f"// {line}" for line in lines)
+
+
+def asks(stack: Stack) -> frozenset[str]:
+    """What the templates are to bring for a material, and whether it asks for cosines alone in place of two directions."""
+    layers = (*stack.layers, stack.base)
+    tangent = {TANGENT} if any(needs_tangent(layer) for layer in layers) else set()
+    cosines = {COSINES} if getattr(stack.base, "by_cosines", False) and not stack.layers else set()
+    return frozenset(stack.reads) | tangent | cosines
 
 
 def approximations(stack: Stack) -> list[str]:
@@ -105,8 +116,14 @@ def print_material(stack: Stack, name: str, uniforms: bool | Literal["prepared"]
     printer = Printer(CHUNKS)
     w = jnp.array([0.0, 0.0, 1.0], jnp.float32)
     inputs = [(w, "wi"), (w, "wo"), *((jnp.zeros(SIZES[name][1], jnp.float32), name) for name in stack.reads)]
+    cosines = COSINES in asks(stack)
+    if cosines:
+        inputs = [(jnp.ones((), jnp.float32), name) for name in ("NoL", "NoV", "lean2")]
 
     def shade(prepared: Any, wi: Any, wo: Any, *place: Any) -> Any:
+        if cosines:
+            (lean2,) = place
+            return jnp.broadcast_to(where((wi > 0.0) & (wo > 0.0), prepared.shade(wi, wo, lean2), 0.0), (3,))
         there = Place(**dict(zip(stack.reads, place, strict=True))) if place else None
         return jnp.broadcast_to(evaluate(stack.form, at(prepared, there), wi, wo), (3,))
 
@@ -143,9 +160,9 @@ def print_material(stack: Stack, name: str, uniforms: bool | Literal["prepared"]
             return shade(live, *args[-len(inputs) :])
 
     local.__doc__ = "BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine."
-    printer.function(local, f"{PREFIX}evaluate", outside, inputs)
+    printer.function(local, f"{PREFIX}{'shade' if cosines else 'evaluate'}", outside, inputs)
     shader = Shader(name, stack, "", values)
-    frame = template("brdf.glsl", shader.asks)
+    frame = template("cosines.glsl" if cosines else "brdf.glsl", shader.asks)
     functions = "\n".join(part for part in (printer.structs_text(), declarations, printer.functions_text(), frame) if part)
     return dataclasses.replace(shader, functions=functions)
 
@@ -167,6 +184,13 @@ def _check_live(stack: Stack) -> None:
 
 def _parts(stack: Stack, prepared: Any) -> list[tuple[str, Any]]:
     """The constants of a prepared material, by the names of the layers that they belong to, in the order of its leaves."""
+    if COSINES in asks(stack):
+        fields = [
+            (field.name, getattr(prepared, field.name))
+            for field in dataclasses.fields(prepared)
+            if not field.metadata.get("static")
+        ]
+        return [(f"{stack.base.name}_{name}", value) for name, value in fields if value is not None]
     if prepared is None or not stack.layers:
         return [(stack.base.name, prepared)]
     parts: list[tuple[str, Any]] = []

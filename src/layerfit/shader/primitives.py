@@ -141,7 +141,7 @@ def _clamp(body: Any, eqn: Any, low: Value, x: Value, high: Value) -> Value:
     return Value(f"clamp({x.text}, {low.text}, {high.text})", kind, reads=reads(low, x, high))
 
 
-BUILTINS = {"dot"}
+BUILTINS = {"dot", "vec2", "vec3", "vec4"}
 """Traced functions that GLSL has by the same name."""
 
 PRIMITIVES: dict[str, Callable[..., Value]] = {

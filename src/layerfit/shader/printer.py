@@ -255,7 +255,8 @@ class Body:
         if primitive in ("jit", "pjit"):
             closed, called = eqn.params["jaxpr"], eqn.params["name"]
             if called in BUILTINS:
-                return [Value(f"{called}({', '.join(a.text for a in operands)})", "float", reads=reads(*operands))]
+                kind = glsl_type(eqn.outvars[0].aval)
+                return [Value(f"{called}({', '.join(a.text for a in operands)})", kind, reads=reads(*operands))]
             if called in self.printer.chunks:
                 return self._call(closed, called, operands, name)
             return self._inline(eqn, closed, operands)

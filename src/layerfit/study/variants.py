@@ -1,21 +1,24 @@
 """The ways in which one material can be evaluated and printed: what error against run time is measured over."""
 
 import dataclasses
-from typing import Any
 
-from .._fields import given
 from ..forms.corrected import Corrected
 from ..preset import MODELS, model_name
 from ..shader.export import print_material
 from ..stack import FORMS, IN_TIME, Stack
+from ..tiers.compact import compact
+from ..tiers.fresnel import with_fresnel
 
 EXACT = "exact"
 """The material as its preset says: its own form, exact reflectances."""
 
+COMPACT_ERRORS = (1e-2, 1e-3, 1e-4)
+"""That the compact tier is held to."""
+
 
 def variants(stack: Stack) -> dict[str, Stack]:
     """Every way by its name, the material itself first. What prints the same shader is listed once."""
-    ways = {EXACT: stack, **_forms(stack), **_fewer_orders(stack)}
+    ways = {EXACT: stack, **_compact(stack), **_forms(stack), **_fewer_orders(stack)}
     ways |= {kind: approximate for kind in ("schlick", "lazanyi") if (approximate := with_fresnel(stack, kind)) is not None}
     seen: dict[str, str] = {}
     for name, way in ways.items():
@@ -41,17 +44,7 @@ def _fewer_orders(stack: Stack) -> dict[str, Stack]:
     return {name: dataclasses.replace(stack, form=dataclasses.replace(form, orders=n)) for name, n in some.items()}
 
 
-def with_fresnel(stack: Stack, kind: str) -> Stack | None:
-    """The material with all reflectances approximate that its form lets be; None where there are none."""
-
-    def changed(layer: Any) -> Any:
-        chosen = "fresnel" in given(type(layer)) and layer.fresnel == "exact"
-        return dataclasses.replace(layer, fresnel=kind) if chosen else layer
-
-    # The tables of the precise form were made with the exact reflectance of a coat: there its base alone is approximate.
-    layers, base = tuple(changed(layer) for layer in stack.layers), changed(stack.base)
-    for made in (dataclasses.replace(stack, layers=layers, base=base), dataclasses.replace(stack, base=base)):
-        same = made.base is stack.base and all(a is b for a, b in zip(made.layers, stack.layers, strict=True))
-        if not same and (not stack.layers or FORMS[type(stack.form)].refuses(made.layers, made.base) is None):
-            return made
-    return None
+def _compact(stack: Stack) -> dict[str, Stack]:
+    """Polynomials for what lies under the coat, of several errors."""
+    made = {f"compact, {error:g}": compact(stack, error) for error in COMPACT_ERRORS}
+    return {name: found[0] for name, found in made.items() if not isinstance(found, str)}

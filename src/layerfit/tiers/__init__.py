@@ -1,0 +1,1 @@
+"""Other ways to print one material: cheaper ones, with their error told."""

@@ -1,0 +1,138 @@
+"""The compact tier: per-material polynomials for all that lies under the coat, fitted to the material's own exact form.
+
+Light under a coat depends on the two directions mostly one at a time. What a direction meets, the energy that passes, its bend, its
+path, is a function of its cosine, and a polynomial of low degree follows it. So does the reflectance of a metal in the half
+cosine, and a width in a sum of widths. Degrees are lowered one by one while the error of the whole BRDF stays below what is asked.
+"""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .._directions import random_pairs
+from ..forms.corrected import Corrected
+from ..forms.precise import Precise
+from ..render import brdf
+from ..stack import Stack, evaluate
+from ..surfaces.microfacet import Conductor
+from . import corrected_metal, diffuse, precise_metal
+from .polynomial import MOST
+from .surface import Compact, Recipe, noted, plain
+
+PAIRS = 16384
+"""Pairs of directions that the error is measured over, random and extreme."""
+
+FLOOR = 1e-4 / np.pi
+"""Values below this part of a white diffuse surface are compared absolutely."""
+
+MARGIN = (0.9, 0.7, 0.5)
+"""Part of the error asked for to which the degrees are lowered: less, where other pairs then show more."""
+
+
+def refuses(stack: Stack) -> str | None:
+    """Why a material has no compact tier, or None."""
+    if stack.reads:
+        return f"it varies over the surface by {', '.join(stack.reads)}"
+    if len(stack.layers) != 1:
+        return "it is made for one coat"
+    coat, base, form = stack.layers[0], stack.base, stack.form
+    if not isinstance(form, (Corrected, Precise)):
+        return "it is made for the corrected and the precise form"
+    if not plain(coat):
+        return f"{coat.name} is not isotropic GGX with the exact reflectance, Smith's masking and no film"
+    if coat.tau_s is not None:
+        return f"{coat.name} scatters light"
+    if not base.lobes:
+        return None
+    if (
+        not isinstance(base, Conductor)
+        or isinstance(base.width, tuple)
+        or (base.distribution, base.masking) != ("ggx", "smith")
+    ):
+        return f"{base.name} is neither diffuse nor an isotropic GGX metal"
+    if isinstance(form, Corrected) and form != Corrected():
+        return "parts of the corrected form are left out, or added"
+    return None
+
+
+def compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
+    """A compact material and its largest relative error against `stack`; or why there is none that is near enough."""
+    if reason := refuses(stack):
+        return reason
+    with jax.enable_x64(True):
+        return _compact(stack.astype(np.float64), max_error)
+
+
+def largest_error(other: Stack, stack: Stack) -> float:
+    """Largest relative error of a material against `stack`."""
+    with jax.enable_x64(True):
+        judge = _Judge(stack.astype(np.float64), 2)
+        return judge.compared(np.asarray(_exact(other.astype(np.float64), judge.wi, judge.wo)))
+
+
+def _compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
+    recipe = _recipe(stack)
+    fitted, others = (_Judge(stack, seed) for seed in (1, 2))
+    full = {name: curve.most for name, curve in recipe.curves.items()}
+    best = fitted.error(_padded(recipe, full))
+    if best > max_error:
+        return f"its error stays at {best:.1e}, and {max_error:.1e} is asked for"
+    for margin in MARGIN:
+        degrees = _lowered(recipe, full, fitted, margin * max_error)
+        error = others.error(_padded(recipe, degrees))
+        if error <= max_error:
+            made = recipe.build({name: curve.fit(degrees[name]) for name, curve in recipe.curves.items()})
+            error = max(error, fitted.error(_padded(recipe, degrees)))
+            form = type(stack.form).__name__.lower()
+            note = f"Compact tier of the {form} form: within {error:.1e} of it, relative, over random and extreme directions."
+            return dataclasses.replace(stack, layers=(), base=noted(made, note)).astype(np.float32), error
+    return f"its error stays at {error:.1e}, and {max_error:.1e} is asked for"
+
+
+def _recipe(stack: Stack) -> Recipe:
+    prepared, name = stack.prepare(), stack.base.name
+    if not stack.base.lobes:
+        return diffuse.recipe(prepared, name, lambda prepared, wi, wo: evaluate(stack.form, prepared, wi, wo))
+    return precise_metal.recipe(prepared, name) if isinstance(stack.form, Precise) else corrected_metal.recipe(prepared, name)
+
+
+def _padded(recipe: Recipe, degrees: dict[str, int]) -> Compact:
+    """The material with polynomials of these degrees, all of the same shape: what judges it is compiled once."""
+    return recipe.build({name: curve.fit(degrees[name], MOST + 1) for name, curve in recipe.curves.items()})
+
+
+def _lowered(recipe: Recipe, full: dict[str, int], judge: "_Judge", max_error: float) -> dict[str, int]:
+    """Degrees as low as the error allows: those of the widest vectors, which cost most, first."""
+    degrees = dict(full)
+    size = lambda name: np.size(recipe.curves[name].y[0])  # noqa: E731
+    for name in sorted(recipe.curves, key=size, reverse=True):
+        while degrees[name] > 1 and judge.error(_padded(recipe, degrees | {name: degrees[name] - 1})) <= max_error:
+            degrees[name] -= 1
+    return degrees
+
+
+class _Judge:
+    """Error of a compact material over pairs of directions."""
+
+    def __init__(self, stack: Stack, seed: int) -> None:
+        self.wi, self.wo = (jnp.asarray(w, float) for w in random_pairs(PAIRS, seed))
+        self.exact = np.asarray(_exact(stack, self.wi, self.wo))
+        self.scale = np.maximum(np.abs(self.exact), FLOOR)
+
+    def error(self, made: Compact) -> float:
+        return self.compared(np.asarray(_values(made, self.wi, self.wo)))
+
+    def compared(self, values: np.ndarray) -> float:
+        error = np.abs(values - self.exact) / self.scale
+        return float(np.max(np.where(np.isfinite(error), error, np.inf)))
+
+
+_exact = jax.jit(brdf)
+
+
+@jax.jit
+def _values(made: Compact, wi: Any, wo: Any) -> Any:
+    return jax.vmap(lambda i, o: jnp.broadcast_to(made.evaluate(i, o), (3,)))(wi, wo)

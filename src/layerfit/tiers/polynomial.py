@@ -1,0 +1,73 @@
+"""Polynomials in one number, with as many coefficients as they need: what a compact material is made of."""
+
+import dataclasses
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from .._chunk import member, struct, vec2, vec3, vec4
+from .._types import Scalar
+
+MOST = 10
+"""Highest degree."""
+
+_VECTOR = {2: vec2, 3: vec3, 4: vec4}
+
+
+@struct
+class Polynomial:
+    """Coefficients of the powers of one argument, numbers or vectors; those beyond the degree are absent."""
+
+    c0: Any = member("coefficients of the powers of the argument")
+    c1: Any = None
+    c2: Any = None
+    c3: Any = None
+    c4: Any = None
+    c5: Any = None
+    c6: Any = None
+    c7: Any = None
+    c8: Any = None
+    c9: Any = None
+    c10: Any = None
+
+    def __call__(self, x: Scalar) -> Any:
+        """The value at x, by Horner's rule."""
+        *lower, value = [c for c in dataclasses.astuple(self) if c is not None]
+        # A vector times a number, and a sum with a vector, are two operations; of vectors alone they are one.
+        if jnp.ndim(value) and not jnp.ndim(x):
+            x = _VECTOR[len(value)](x)
+        for c in reversed(lower):
+            value = c + x * value
+        return value
+
+    @property
+    def degree(self) -> int:
+        """Highest power."""
+        return sum(c is not None for c in dataclasses.astuple(self)) - 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Curve:
+    """What a polynomial is to run through: values (n,) or (n, k) at arguments x (n,), and how much each counts."""
+
+    x: np.ndarray
+    y: np.ndarray
+    weight: np.ndarray | float = 1.0
+    most: int = MOST
+    """Highest degree that is tried."""
+
+    def fit(self, degree: int, length: int = 0) -> Polynomial:
+        """Least squares over Chebyshev's polynomials; `length` pads with coefficients of 0, for polynomials of one shape."""
+        chebyshev = np.polynomial.chebyshev
+        low, high = float(self.x.min()), float(self.x.max())
+        rows = chebyshev.chebvander((2.0 * self.x - low - high) / (high - low), degree)
+        y = self.y.reshape(len(self.x), -1)
+        weight = np.broadcast_to(np.reshape(self.weight, (-1, 1)) if np.ndim(self.weight) == 1 else self.weight, y.shape)
+        columns = []
+        for values, w in zip(y.T, weight.T, strict=True):
+            fitted = np.linalg.lstsq(rows * w[:, None], values * w, rcond=None)[0]
+            powers = chebyshev.Chebyshev(fitted, [low, high]).convert(kind=np.polynomial.Polynomial).coef
+            columns.append(np.pad(powers, (0, max(degree + 1, length) - len(powers))))
+        coefficients = np.stack(columns, -1)
+        return Polynomial(*(coefficients[:, 0] if self.y.ndim == 1 else coefficients))

@@ -1,0 +1,74 @@
+"""A compact material: to all that shades it is one surface, which asks for cosines alone."""
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from .._types import Colour, Scalar, Vec3
+from ..layers import Coat
+from ..surfaces.base import Surface
+from .polynomial import Curve, Polynomial
+
+NODES = 400
+"""Arguments that a curve is fitted at."""
+
+
+class Compact(Surface):
+    """An isotropic material whose BRDF is made of what happens to one direction, twice, and of their meeting."""
+
+    name: str
+    note: str
+    by_cosines = True
+    """Its shader needs no frame: it takes NoL, NoV and how far the two directions lean apart."""
+
+    @abstractmethod
+    def way(self, NoW: Scalar) -> Any:
+        """What becomes of one direction."""
+
+    @abstractmethod
+    def meet(self, i: Any, o: Any, lean2: Scalar) -> Colour:
+        """BRDF [1/sr] of two of them; `lean2` is the squared length of the sum of their parts along the surface."""
+
+    def shade(self, NoL: Scalar, NoV: Scalar, lean2: Scalar) -> Colour:
+        """BRDF [1/sr] of directions above the surface."""
+        way_i, way_o = self.way(NoL), self.way(NoV)
+        return self.meet(way_i, way_o, lean2)
+
+    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+        """The same of directions in the frame of the surface."""
+        x, y = wi[0] + wo[0], wi[1] + wo[1]
+        return self.shade(wi[2], wo[2], x * x + y * y)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a compact material is made of its exact one: the curves that it needs, and what is built from their polynomials."""
+
+    curves: Mapping[str, Curve]
+    build: Callable[[Mapping[str, Polynomial]], Compact]
+
+
+def noted(made: Compact, note: str) -> Compact:
+    """The same material with what its shader says of it."""
+    surface: Any = made
+    return replace(surface, note=note)
+
+
+def plain(coat: Coat) -> bool:
+    """Whether a coat is of the kind that `coat_lobe` is made for."""
+    usual = (coat.distribution, coat.masking, coat.fresnel) == ("ggx", "smith", "exact")
+    return usual and not isinstance(coat.width, tuple) and not coat.has_film
+
+
+def cosines() -> np.ndarray:
+    """Cosines (n,) from grazing to the normal, without both, closer at the ends: where the curves of one direction are fitted at."""
+    return 0.5 * (1.0 - np.cos(np.linspace(0.005, np.pi - 0.005, NODES)))
+
+
+def colour_of(values: Any) -> Any:
+    """The colour before the last number of a vector: three of four, or the one of two where it is grey."""
+    return values[:3] if jnp.shape(values) == (4,) else values[0]

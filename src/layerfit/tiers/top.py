@@ -1,0 +1,40 @@
+"""What an isotropic coat reflects at its own top, from cosines alone.
+
+An isotropic BRDF depends on three numbers: the cosines NoL and NoV, and how far the light's and the viewer's directions are from
+mirroring each other, lean2 = |t_l + t_v|^2 with t the part of a direction along the surface. With these no frame is needed, and
+nothing cancels: of s = l + v, |s|^2 = lean2 + (NoL + NoV)^2, and lean2 / |s|^2 is the squared sine of the half vector.
+"""
+
+import math
+
+import jax.numpy as jnp
+
+from .._chunk import chunk
+from .._types import Scalar
+from ..layers import Coat
+
+
+@chunk
+def hidden_cosine(NoW: Scalar, alpha2: Scalar) -> Scalar:
+    """NoW (1 + 2 Lambda) of GGX facets of squared width alpha2 (Heitz 2014, eq. 72, multiplied out)."""
+    return jnp.sqrt(alpha2 + (1.0 - alpha2) * (NoW * NoW))
+
+
+@chunk
+def coat_lobe(coat: Coat, NoL: Scalar, NoV: Scalar, hidden_l: Scalar, hidden_v: Scalar, lean2: Scalar) -> Scalar:
+    """F D V of the coat's top: `fresnel_dielectric`, `ggx_d` and `v_smith`, multiplied out over one denominator."""
+    M = NoL + NoV
+    M2 = M * M
+    s2 = lean2 + M2
+    quarter = 0.25 * s2
+    c = jnp.sqrt(quarter)
+    g = jnp.sqrt((coat.eta - 1.0) * (coat.eta + 1.0) + quarter)
+    eta2 = coat.eta * coat.eta
+    across = (c + g) * (c + g)
+    along = (eta2 * c + g) * (eta2 * c + g)
+    # 2 F = (delta / across)^2 + (delta k / along)^2
+    rp = ((eta2 + 1.0) * quarter - 1.0) * across
+    reflected = along * along + rp * rp
+    ratio = ((coat.eta - 1.0) * (coat.eta + 1.0) * 0.5 / math.sqrt(math.pi) * coat.alpha) * s2
+    ratio = ratio / ((lean2 + (coat.alpha * coat.alpha) * M2) * (across * along))
+    return reflected * (ratio * ratio) / (NoV * hidden_l + NoL * hidden_v)

@@ -1,0 +1,135 @@
+"""Other ways to print one material: their errors are true, their shaders are their own JAX functions, and they are as short as promised."""
+
+import dataclasses
+import shutil
+
+import jax
+import numpy as np
+import pytest
+
+from helpers import COPPER, STACKS
+from layerfit._directions import random_pairs
+from layerfit.errors import InputError
+from layerfit.forms.corrected import Corrected
+from layerfit.forms.precise import Precise
+from layerfit.layers import Coat
+from layerfit.render import brdf, brdf_values
+from layerfit.shader.choose import choose_tier
+from layerfit.shader.cost import instructions
+from layerfit.shader.export import print_material
+from layerfit.shader.verify import check_pairs
+from layerfit.stack import Stack
+from layerfit.surfaces import Conductor, Lambert, OrenNayar
+from layerfit.tiers.polynomial import Curve
+from layerfit.tiers.tier import TIERS, make_tier
+from test_export import DISTANT, INTENSITY, IRRADIANCE, POINT, agree, by_jax, drawn, with_lights
+
+LACQUER = Coat(alpha=0.1, eta=1.5, tau=[0.05, 0.2, 0.6])
+METAL, PAPER = Conductor(alpha=0.2, **COPPER), Lambert(albedo=[0.5, 0.3, 0.1])
+MATERIALS = {
+    "corrected, metal": (Stack((LACQUER,), METAL, Corrected()), 1e-4),
+    "precise, metal": (Stack((LACQUER,), METAL, Precise()), 1e-4),
+    "corrected, diffuse": (Stack((LACQUER,), PAPER, Corrected()), 1e-4),
+    "precise, diffuse": (Stack((LACQUER,), PAPER, Precise()), 1e-3),
+    "corrected, clear and grey": (Stack((Coat(alpha=0.2, eta=1.4),), Conductor(alpha=0.3, eta=0.2, k=3.5), Corrected()), 1e-4),
+    "precise, clear and grey": (Stack((Coat(alpha=0.2, eta=1.4),), Conductor(alpha=0.3, eta=0.2, k=3.5), Precise()), 1e-3),
+}
+
+INSTRUCTIONS = {"corrected, metal": 210, "precise, metal": 340, "corrected, diffuse": 100, "precise, diffuse": 118}
+"""At most, of the whole fragment shader with one light, after spirv-opt -O; Phong has 27."""
+
+ROUNDING = 2e-5
+"""Of float32, in which tiers are evaluated here; their own errors are of float64."""
+
+
+@pytest.fixture(scope="module")
+def made():
+    """Compact tiers by their names, each made once."""
+    return {name: make_tier(stack, "compact", asked) for name, (stack, asked) in MATERIALS.items()}
+
+
+@pytest.mark.parametrize("name", ["corrected, metal", "precise, diffuse"])
+def test_the_error_that_is_stated_is_true(made, name):
+    stack, asked = MATERIALS[name]
+    wi, wo = random_pairs(8192, seed=7)
+    exact = np.asarray(jax.jit(brdf)(stack.astype(np.float64), wi.astype(float), wo.astype(float)))
+    error = np.abs(brdf_values(made[name].stack, wi, wo) - exact) / np.maximum(np.abs(exact), 1e-4 / np.pi)
+    assert error.max() <= 1.2 * made[name].error + ROUNDING
+    assert made[name].error <= asked
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_the_shader_is_the_jax_function(gl, made, name):
+    shader = print_material(made[name].stack, "test")
+    parity = check_pairs(shader, 16384)
+    assert parity.passed, parity
+    assert f"within {made[name].error:.1e}" in shader.text()
+
+
+def test_the_exported_shader_draws_it_without_a_frame(gl, made):
+    stack = made["corrected, metal"].stack
+    text = print_material(stack, "test").text()
+    assert "mat3" not in text
+    lights = [(DISTANT, IRRADIANCE), (POINT, INTENSITY)]
+    agree(drawn(with_lights(text, 2), lights), by_jax(stack, lights))
+
+
+@pytest.mark.skipif(not shutil.which("spirv-opt"), reason="spirv-opt, which instructions are counted with, is absent")
+@pytest.mark.parametrize("name", INSTRUCTIONS)
+def test_how_many_instructions(made, name):
+    assert 2 * 27 < instructions(print_material(made[name].stack, "test")).total <= INSTRUCTIONS[name]
+
+
+def test_degrees_are_as_low_as_the_error_allows(made):
+    stack, asked = MATERIALS["corrected, metal"]
+    coarse = make_tier(stack, "compact", 30.0 * asked)
+    degrees = lambda tier: {k: p.degree for k, p in vars(tier.stack.base).items() if hasattr(p, "degree")}  # noqa: E731
+    fine, rough = degrees(made["corrected, metal"]), degrees(coarse)
+    assert sum(rough.values()) < sum(fine.values()) - 3
+    assert made["corrected, metal"].error < coarse.error <= 30.0 * asked
+
+
+@pytest.mark.parametrize(
+    ("stack", "said"),
+    [
+        (STACKS["corrected, anisotropic"], "not isotropic GGX"),
+        (STACKS["corrected, three layers"], "one coat"),
+        (STACKS["faithful over conductor"], "the corrected and the precise form"),
+        (Stack((LACQUER,), OrenNayar(), Corrected()), "its error stays at"),
+    ],
+)
+def test_what_has_no_compact_tier_says_why(stack, said):
+    with pytest.raises(InputError, match=said):
+        make_tier(stack)
+
+
+def test_short_fresnel_formulas_and_the_faithful_form():
+    stack = MATERIALS["corrected, metal"][0]
+    errors = {name: make_tier(stack, name).error for name in TIERS if name != "compact"}
+    assert errors["exact"] == 0.0
+    assert 1e-3 < errors["lazanyi"] < errors["schlick"] < errors["faithful"]
+    with pytest.raises(InputError, match="would not differ"):
+        make_tier(MATERIALS["precise, diffuse"][0], "schlick")
+    with pytest.raises(InputError, match="is asked for"):
+        make_tier(stack, "faithful", 1e-2)
+    with pytest.raises(InputError, match="should be one of exact"):
+        make_tier(stack, "compct")  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.skipif(not shutil.which("spirv-opt"), reason="spirv-opt, which instructions are counted with, is absent")
+def test_the_cheapest_that_is_near_enough():
+    stack = MATERIALS["corrected, diffuse"][0]
+    assert choose_tier(stack, "test", max_error=1e-4).tier.name == "compact"
+    assert choose_tier(stack, "test", max_error=1e-9).tier.name == "exact"
+    assert choose_tier(stack, "test", max_cost=4.0).tier.name == "compact"
+    assert choose_tier(stack, "test", max_cost=40.0).tier.name == "exact"
+    with pytest.raises(InputError, match="no tier costs 1 times Phong or less"):
+        choose_tier(stack, "test", max_cost=1.0)
+
+
+def test_a_polynomial_of_its_own_degree_is_found_again():
+    x = np.linspace(0.2, 1.7, 50)
+    p = Curve(x, np.stack([1.0 - 2.0 * x + x**3, 0.5 * x**2], -1)).fit(3)
+    assert p.degree == 3
+    np.testing.assert_allclose(np.asarray(p(0.7)), [1.0 - 1.4 + 0.343, 0.245], rtol=1e-12)
+    assert dataclasses.astuple(Curve(x, x).fit(1, 4))[4:] == (None,) * 7
