@@ -130,7 +130,7 @@ def test_an_environment_map_is_named_from_the_scene(scene, tmp_path):
         ('name = "coat"', 'name = "a; discard;"', "letters, digits and underscores"),
         ('type = "conductor"', 'type = "copper"', "type = 'copper' is not one of"),
         ('free = ["coat.alpha"]', 'loss = "hubert"', "did you mean 'huber'"),
-        ('free = ["coat.alpha"]', "starts = 0", "from 1 up"),
+        ('free = ["coat.alpha"]', "starts = 0", "from 1 to 1000"),
         ('free = ["coat.alpha"]', "min_cosine = 1", "from 0 to below 1"),
         ('free = ["coat.alpha"]', 'free = "coat.alpha"', "a list of parameters"),
         ("[material.base]", "[material.basis]", "unknown key 'basis'"),

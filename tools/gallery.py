@@ -37,7 +37,9 @@ STAMP = "shader"
 
 NUMBER = re.compile(r"-?\d+(?:\.\d*(?:e[+-]?\d+)?|e[+-]?\d+)")
 LAST_DIGITS = 2e-4
-"""What numbers may differ by, over the largest of their line or a hundredth: they are fitted in float32."""
+"""What numbers may differ by, over the largest of their line or LEAST: they are fitted in float32, and two versions of XLA differ by half of it."""
+
+LEAST = 0.03
 
 SIDE = 128
 FINER = 2
@@ -113,7 +115,7 @@ def _close(line: str, other: str) -> bool:
     # Comments are aligned, so more digits mean fewer blanks.
     words, others = (NUMBER.sub("#", each).split() for each in (line, other))
     a, b = (np.array([float(number) for number in NUMBER.findall(each)]) for each in (line, other))
-    return words == others and np.allclose(a, b, rtol=0.0, atol=LAST_DIGITS * max(1e-2, *np.abs(b)))
+    return words == others and np.allclose(a, b, rtol=0.0, atol=LAST_DIGITS * max(LEAST, *np.abs(b)))
 
 
 def drawn_by(path: Path) -> str | None:

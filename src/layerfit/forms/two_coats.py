@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._chunk import chunk, clip, safe_power, safe_sqrt, struct, where
+from .._chunk import chunk, clip, safe_divide, safe_power, safe_sqrt, struct, where
 from .._types import Colour, Scalar, Vec3
 from ..layers import Coat
 from . import one_coat, tables
@@ -82,7 +82,10 @@ class _Top:
         known = jnp.concatenate([cells_of(edge), cosines])
         R = jnp.concatenate([jnp.asarray(self.nodes.R), self.nodes.weights / jnp.maximum(2.0 * cosines * widths, 1e-12)])
         order = jnp.argsort(known)
-        return jnp.interp(z, known[order], R[order])
+        known, R = known[order], R[order]
+        # Not `jnp.interp`, which looks nodes up: a page computes this too, and has no step for that.
+        along = clip(safe_divide(z[:, None] - known[:-1], jnp.diff(known)), 0.0, 1.0)
+        return R[0] + along @ jnp.diff(R)
 
 
 def prepare(outer: Coat, inner: Coat, base: Any, kind: Kind) -> Prepared:

@@ -113,6 +113,8 @@ class _Program:
             return self.walk(inner.jaxpr, inner.consts, operands)
         if kind == "split":
             return [self.view(operands[0], cut) for cut in _cuts(p["axis"], p["sizes"])]
+        if kind == "unstack":
+            return [self.view(operands[0], row) for row in _rows(p["axis"], len(eqn.outvars))]
         shape = eqn.outvars[0].aval.shape
         if all(place.index in self.known for place in operands):
             return [self.constant(eqn.primitive.bind(*(self.value(place) for place in operands), **p))]
@@ -169,6 +171,11 @@ def _cuts(axis: int, sizes: Sequence[int]) -> Iterator[Callable[[np.ndarray], np
         part = (*[slice(None)] * axis, slice(start, start + size))
         yield lambda a, part=part: a[part]
         start += size
+
+
+def _rows(axis: int, count: int) -> Iterator[Callable[[np.ndarray], np.ndarray]]:
+    for k in range(count):
+        yield lambda a, at=(*[slice(None)] * axis, k): a[at]
 
 
 def _broadcast(to: _Program, operands: list[Place], shape: tuple[int, ...], p: Mapping[str, Any]) -> Place:
