@@ -25,8 +25,9 @@ lint: dev  ## style and types
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
+# Without test_wheel.py, which `make wheel` runs where it belongs.
 pytest: dev  ## the tests, on the source tree; PYTEST_ARGS="-k fresnel" for some of them
-	$(BIN)/pytest --numprocesses auto --dist worksteal --durations 10 $(PYTEST_ARGS)
+	$(BIN)/pytest --numprocesses auto --dist worksteal --durations 10 --ignore tests/test_wheel.py $(PYTEST_ARGS)
 
 wheel: dev  ## build the wheel and run the tests marked `wheel` on it, away from the source tree
 	rm -rf dist

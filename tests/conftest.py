@@ -38,7 +38,7 @@ if importlib.util.find_spec("beartype"):
 # Traces make objects by the million, few of them rubbish.
 gc.set_threshold(50_000, 20, 20)
 
-MOST_MEMORY = 3.0e9
+MOST_MEMORY = 4.0e9
 """Bytes in memory above which what JAX keeps compiled is thrown away: a whole run would keep 6 GB."""
 
 

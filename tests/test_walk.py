@@ -291,7 +291,7 @@ def oracle_scores(oracle: Path, interface: str, kind: str, every: int, paths: in
     return (f.mean[:, 0] - wanted) / np.hypot(f.se[:, 0], se)
 
 
-@pytest.mark.parametrize(("every", "paths"), [(12, 40_000), pytest.param(1, 12_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("every", "paths"), [(12, 40_000), pytest.param(1, 6_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", ["lambert", "conductor"])
 @pytest.mark.parametrize("interface", ["single", "multi"])
 def test_another_walk(oracle: Path, interface: str, kind: str, every: int, paths: int) -> None:
