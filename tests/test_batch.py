@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 
 from layerfit import InputError, fit_batch
+from layerfit.batch.sharing import fitted
 from layerfit.batch.table import JOURNAL
+from layerfit.batch.tasks import Task
 
 REFERENCES = Path(__file__).parents[1] / "examples" / "references"
 QUICK = {"quick": True, "metric": "law"}
@@ -99,6 +101,34 @@ def test_a_scene_whose_worker_is_killed_is_tried_again(scenes, tmp_path):
     os.kill(worker, signal.SIGKILL)
     assert run.wait(timeout=120) == 0
     assert [row["error"] for row in table(tmp_path / "out")] == ["", "", ""]
+
+
+class Deadly(Task):
+    """A scene that kills whatever worker takes it."""
+
+    def __reduce__(self):
+        return os._exit, (9,)
+
+
+def test_a_scene_that_kills_its_workers_takes_no_other_along(tmp_path):
+    tasks = {name: Task(tmp_path / f"{name}.toml", {}, None, {}) for name in "abcdef"}
+    tasks["b"] = Deadly(tmp_path / "b.toml", {}, None, {})
+    rows = dict(fitted(tasks, 2))
+    assert set(rows) == set(tasks)
+    assert "killed twice" in rows["b"]["error"]
+    assert all("cannot be read" in rows[name]["error"] for name in "acdef")
+
+
+def test_a_quick_fit_with_all_that_it_leaves(gl, scenes, tmp_path):
+    """The same row, beside a directory; sigmas are of the noise alone, and there is one start."""
+    alone = fit_batch([scenes / "a.toml"], tmp_path / "rows", **QUICK).rows[0]
+    each = fit_batch([scenes / "a.toml"], tmp_path / "each", each=True, **QUICK).rows[0]
+    document = json.loads((Path(each["directory"]) / "fit.json").read_text())
+    assert document["starts"] == 1
+    assert not any("sigma_model" in row for row in document["parameters"].values())
+    assert {key: each[key] for key in alone if key.startswith("base.")} == {
+        key: alone[key] for key in alone if key.startswith("base.")
+    }
 
 
 def test_the_table_as_parquet(scenes, tmp_path):

@@ -2,6 +2,9 @@
 
 import numpy as np
 
+FLOOR = 1e-4
+"""Values below this part of a lit white diffuse surface (for images: of white) are compared absolutely."""
+
 
 def random_pairs(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of unit directions above the surface, float32: uniform ones, mirror and retro pairs with small offsets, grazing ones."""

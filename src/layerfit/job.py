@@ -5,7 +5,7 @@ import dataclasses
 import io
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from .fit.advise import advise
 from .fit.fit import fit
 from .fit.metrics import exposure, image_error
 from .fit.residuals import scaled
-from .fit.result import FitResult, to_json
+from .fit.result import FitResult, parameters, to_json
 from .fit.weights import FLOOR_SHARE, MODEL_SHARE
 from .fit.words import structure
 from .forms.accuracy import against_walk
@@ -64,36 +64,24 @@ def fit_scene(
     import_s: float = 0.0,
     progress: Progress = lambda stage, share: None,
     profile: Sequence[str] = (),
+    model_error: bool = True,
     **options: Any,
 ) -> Outcome:
     """Fit a scene, or its file, and write everything to `directory`; each file whole or not at all, `fit.json` last.
 
-    `profile` are parameters whose intervals are found by fitting the others again.
+    `profile` are parameters whose intervals are found by fitting the others again; without `model_error` sigmas are of the noise alone.
     `options` override the scene's [fit] table. Raises `LayerfitError` for input or a machine that is at fault.
     """
     began = time.perf_counter()
     scene = scene if isinstance(scene, Scene) else read_scene(scene)
     path, directory = scene.path, Path(directory)
-    request = dataclasses.replace(scene.fit, **{k: v for k, v in options.items() if v is not None})
+    scene = asked(scene, options)
     views = load(scene)
     check_directory(directory)
     renderer()  # a machine that cannot verify is told so before the fit, not after it
     read_s = time.perf_counter() - began
     progress("fit", 0.0)
-    result = fit(
-        views,
-        scene.start,
-        free=request.free,
-        fixed=dict(request.fixed),
-        metric=request.metric,
-        loss=request.loss,
-        starts=request.starts,
-        seed=request.seed,
-        model_error=True,
-        profile=profile,
-        where=f"{path}: fit",
-        progress=progress,
-    )
+    result = fit_views(views, scene, model_error=model_error, profile=profile, progress=progress)
     progress("shader", 0.0)
     fitted = time.perf_counter()
     name = path.stem
@@ -103,6 +91,8 @@ def fit_scene(
     parity = together([*(drawing.parity for drawing in drawings), check_pairs(shader)])
     verified = time.perf_counter()
     picture = pictures.strip([drawing.row() for drawing in drawings])
+    pairs = [drawing.pair() for drawing in drawings]
+    live = viewer.live(result.stack, name, finite(parameters(result)))
     errors = mean_error(drawings)
     quadrature = _quadrature(result)
     now = time.perf_counter()
@@ -122,10 +112,10 @@ def fit_scene(
     document["model"] = _model(result.stack)
     document["model_error"] = against_walk(result.stack.layers, result.stack.base, result.stack.form) or {}
     document["pixels"]["usable"] = sum(len(view.index) for view in result.views)
-    document["metric"] = request.metric
+    document["metric"] = scene.fit.metric
     document["weighting"] = {
-        "kind": request.metric,
-        "loss": request.loss,
+        "kind": scene.fit.metric,
+        "loss": scene.fit.loss,
         "model_share": MODEL_SHARE,
         "floor_share": FLOOR_SHARE,
         "noise": [view.noise is not None for view in result.views],
@@ -139,12 +129,32 @@ def fit_scene(
         write_bytes(directory / "planes.png", in_planes)
     write_text(directory / "preset.json", json.dumps(preset_of(result.stack, name, fit=_summary(document)), indent=2) + "\n")
     trace = [(row.time_s, row.stage, row.start, row.error) for row in result.trace]
-    pairs = [drawing.pair() for drawing in drawings]
-    live = viewer.live(result.stack, name, document["parameters"])
     report = html.page(name, document, pairs, picture, trace, shader.text(), live, in_planes)
     write_text(directory / "report.html", report)
     write_text(directory / "fit.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
     return Outcome(document, directory, result.converged and parity.passed)
+
+
+def asked(scene: Scene, options: Mapping[str, Any]) -> Scene:
+    """The scene with those of its [fit] table that are given otherwise; None is not given."""
+    return dataclasses.replace(scene, fit=dataclasses.replace(scene.fit, **{k: v for k, v in options.items() if v is not None}))
+
+
+def fit_views(views: Sequence[AnyView], scene: Scene, **options: Any) -> FitResult:
+    """What a scene asks for, fitted to its references; `options` are further ones of `fit`."""
+    request = scene.fit
+    return fit(
+        views,
+        scene.start,
+        free=request.free,
+        fixed=dict(request.fixed),
+        metric=request.metric,
+        loss=request.loss,
+        starts=request.starts,
+        seed=request.seed,
+        where=f"{scene.path}: fit",
+        **options,
+    )
 
 
 def _planes(result: FitResult, name: str) -> bytes | None:

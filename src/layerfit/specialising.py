@@ -14,7 +14,7 @@ from .capture.scene import FitRequest, Scene, read_scene
 from .documents import check_directory, finite, write_text
 from .errors import InputError
 from .fit.fit import fit
-from .fit.parameters import known_parameters
+from .fit.parameters import known_parameters, with_fixed
 from .preset import left_out, preset_of, read_preset
 from .report import specialise as report
 from .shader.cost import instructions, times, tools
@@ -173,9 +173,6 @@ def _refitted(removal: Removal, task: fits.Task, request: FitRequest, held: froz
 
 def _with_values(stack: Stack, values: Mapping[str, Any]) -> Stack:
     """The material with these of its parameters."""
-    layers = [*stack.layers, stack.base]
-    known = known_parameters(stack)
-    for key, value in values.items():
-        k, field, spec = known[key]
-        layers[k] = dataclasses.replace(layers[k], **{field: np.clip(np.asarray(value, float), spec.lower, spec.upper)})
-    return dataclasses.replace(stack, layers=tuple(layers[:-1]), base=layers[-1])
+    ranges = {key: (spec.lower, spec.upper) for key, (_, _, spec) in known_parameters(stack).items()}
+    # Kept in float32, which may round a value at its bound across it.
+    return with_fixed(stack, {key: np.clip(value, *ranges[key]).tolist() for key, value in values.items()}, "specialise")

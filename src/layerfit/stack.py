@@ -1,5 +1,6 @@
 """A layered material: coats over a base, and the form in which the light between them is computed."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -52,6 +53,11 @@ class Stack:
     def needs(self) -> tuple[str, ...]:
         """What of it this material cannot do without: what a fit gives it. Flakes are fitted by their mean."""
         return needs(*self.layers, self.base)
+
+    def with_parts(self, parts: Sequence[Any]) -> "Stack":
+        """The same form of other layers, the base last."""
+        *layers, base = parts
+        return replace(self, layers=tuple(layers), base=base)
 
     def without(self, name: str) -> "Stack":
         """The same material with one layer taken off."""

@@ -1,16 +1,14 @@
 """One fit of a batch, as a row of its table."""
 
-import dataclasses
 import time
 from typing import Any
 
 from ..capture.load import load
-from ..capture.scene import Scene, read_scene
+from ..capture.scene import read_scene
 from ..errors import LayerfitError
-from ..fit.fit import fit
 from ..fit.result import correlations, flags, parameters
 from ..fit.words import structure
-from ..job import fit_scene
+from ..job import asked, fit_scene, fit_views
 from .tasks import Task
 
 CHANNELS = ("r", "g", "b")
@@ -40,27 +38,10 @@ def _values(task: Task) -> Row:
     if quick:
         options.setdefault("starts", 1)
     if task.directory is not None:
-        document = fit_scene(task.scene, task.directory, **options).document
-        return {
-            "scene": str(task.scene),
-            **_columns(document["parameters"]),
-            **_outcome(document),
-            "directory": str(task.directory),
-        }
-    scene: Scene = read_scene(task.scene)
-    asked = dataclasses.replace(scene.fit, **options)
-    result = fit(
-        load(scene),
-        scene.start,
-        free=asked.free,
-        fixed=dict(asked.fixed),
-        metric=asked.metric,
-        loss=asked.loss,
-        starts=asked.starts,
-        seed=asked.seed,
-        model_error=not quick,
-        where=f"{task.scene}: fit",
-    )
+        document = fit_scene(task.scene, task.directory, model_error=not quick, **options).document
+        return {**_outcome(document), "directory": str(task.directory), **_columns(document["parameters"])}
+    scene = asked(read_scene(task.scene), options)
+    result = fit_views(load(scene), scene, model_error=not quick)
     rows = parameters(result)
     outcome = {
         "converged": result.converged,

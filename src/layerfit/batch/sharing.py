@@ -2,8 +2,9 @@
 
 import multiprocessing
 import signal
+from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 
 from ..cache import use_compilation_cache
@@ -23,30 +24,33 @@ def fitted(tasks: dict[str, Task], workers: int) -> Iterator[tuple[str, Row]]:
     while left:
         # Spawned: a process that has run JAX cannot be forked.
         with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=_begin_worker) as pool:
-            futures: dict[Future[Row], str] = {pool.submit(run, task): key for key, task in left.items()}
-            try:
-                for future in as_completed(futures):
-                    key = futures[future]
-                    row = _row_of(future)
-                    if row is None:
-                        continue
-                    del left[key]
-                    yield key, row
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
-        for key in list(left):  # the pool broke: a worker was killed, and took along what had begun
-            tries[key] += 1
-            if tries[key] >= TRIES:
-                task = left.pop(key)
-                yield key, failed(task, "its worker was killed twice, as by a machine out of memory; try fewer --workers")
+            yield from _shared(pool, left, tries, workers)
 
 
-def _row_of(future: "Future[Row]") -> Row | None:
+def _shared(pool: Executor, left: dict[str, Task], tries: dict[str, int], workers: int) -> Iterator[tuple[str, Row]]:
+    """Rows until all are known, or a worker is killed: what was in hand then was tried. What was tried before goes first, and alone, so
+    that no scene is given up for what another does to its worker."""
+    waiting = deque(sorted(left, key=lambda key: -tries[key]))
+    running: dict[Future[Row], str] = {}
     try:
-        return future.result()
+        while waiting or running:
+            alone = any(tries[key] for key in (*running.values(), *list(waiting)[:1]))
+            while waiting and len(running) < (1 if alone else workers):
+                key = waiting.popleft()
+                running[pool.submit(run, left[key])] = key
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                row = future.result()
+                key = running.pop(future)
+                del left[key]
+                yield key, row
     except BrokenProcessPool:
-        return None
+        for key in running.values():
+            tries[key] += 1
+            if tries[key] == TRIES:
+                yield (
+                    key,
+                    failed(left.pop(key), "its worker was killed twice, as by a machine out of memory; try fewer --workers"),
+                )
 
 
 def _begin_worker() -> None:

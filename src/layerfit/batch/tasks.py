@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import hashlib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from glob import glob
 from pathlib import Path
@@ -38,10 +39,11 @@ class Task:
 
 def tasks_of(scenes: Sequence[str | Path], directory: Path, each: bool, options: dict[str, Any]) -> list[Task]:
     found = [pair for scene in scenes for pair in _found(str(scene))]
-    named = [path.stem for path, _ in found]
+    named = Counter(path.stem for path, _ in found)
     tasks = []
-    for (path, labels), name in zip(found, named, strict=True):
-        own = name if named.count(name) == 1 else f"{name}_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:8]}"
+    for path, labels in found:
+        name = path.stem
+        own = name if named[name] == 1 else f"{name}_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:8]}"
         tasks.append(Task(path, {"scene": str(path), **labels}, directory / own if each else None, options))
     unique = {(task.scene.resolve(), tuple(task.labels.items())): task for task in tasks}
     return list(unique.values())

@@ -30,13 +30,17 @@ stderr = Console(stderr=True, highlight=False)
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 Scene = Annotated[Path, typer.Argument(help="Scene file (TOML or JSON): reference, camera, lights, material, fit.")]
 Preset = Annotated[Path, typer.Argument(help="Preset file (JSON): a material.")]
+Output = Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")]
+Starts = Annotated[int | None, typer.Option(min=1, help="Starts that are tried; more find a global minimum more surely.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")]
+Metric = Annotated[str | None, typer.Option(help="law, uniform, relative, log or cube_root.")]
+Loss = Annotated[str | None, typer.Option(help="square, huber or cauchy.")]
 
 
 def main() -> None:
     """Run the command line; every fault of input or machine is one message and exit code 2."""
-    gc.set_threshold(
-        50_000, 20, 20
-    )  # a trace makes objects by the million, few of them rubbish: looking for it was a tenth of its time
+    # A trace makes objects by the million, few of them rubbish: looking for it was a tenth of its time.
+    gc.set_threshold(50_000, 20, 20)
     try:
         app()
     except LayerfitError as error:

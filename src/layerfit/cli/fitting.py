@@ -6,19 +6,17 @@ from typing import Annotated, Any
 
 import typer
 
-from .app import STARTED, Json, Scene, app, check_choice, emit, many, progress, say, stderr
+from .app import STARTED, Json, Loss, Metric, Output, Scene, Seed, Starts, app, check_choice, emit, many, progress, say, stderr
 
 
 @app.command()
 def fit(
     scene: Scene,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
-    starts: Annotated[
-        int | None, typer.Option(min=1, help="Starts that are tried; more find a global minimum more surely.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")] = None,
-    metric: Annotated[str | None, typer.Option(help="law, uniform, relative, log or cube_root.")] = None,
-    loss: Annotated[str | None, typer.Option(help="square, huber or cauchy.")] = None,
+    output: Output = Path("out"),
+    starts: Starts = None,
+    seed: Seed = None,
+    metric: Metric = None,
+    loss: Loss = None,
     profile: Annotated[
         list[str] | None,
         typer.Option(
@@ -72,7 +70,7 @@ def _show_fit(outcome: Any, as_json: bool) -> None:
 @app.command()
 def structures(
     reference: Annotated[Path, typer.Argument(help="Scene file, or a measured BRDF: .brdf, .bsdf, .binary or .csv.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    output: Output = Path("out"),
     only: Annotated[str | None, typer.Option(help="Names of structures to try, with commas; left out, all.")] = None,
     metric: Annotated[str, typer.Option(help="law, uniform, relative, log or cube_root.")] = "log",
     min_half_deg: Annotated[
@@ -124,10 +122,10 @@ def batch(
         bool, typer.Option("--each", help="A directory of each fit too, with all that `layerfit fit` leaves.")
     ] = False,
     quick: Annotated[bool, typer.Option("--quick", help="One start, and sigmas of the noise alone.")] = False,
-    starts: Annotated[int | None, typer.Option(min=1, help="Starts that are tried for each.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")] = None,
-    metric: Annotated[str | None, typer.Option(help="law, uniform, relative, log or cube_root.")] = None,
-    loss: Annotated[str | None, typer.Option(help="square, huber or cauchy.")] = None,
+    starts: Starts = None,
+    seed: Seed = None,
+    metric: Metric = None,
+    loss: Loss = None,
     as_json: Json = False,
 ) -> None:
     """Fit many scenes into one table.

@@ -6,13 +6,13 @@ from typing import Annotated
 
 import typer
 
-from .app import Json, Preset, Scene, app, emit, progress, say, stderr
+from .app import Json, Output, Preset, Scene, app, emit, progress, say, stderr
 
 
 @app.command()
 def truth(
     preset: Preset,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    output: Output = Path("out"),
     interface: Annotated[
         str | None, typer.Option(help="single or multi: what a rough interface does; left out, as in the preset, else single.")
     ] = None,
@@ -52,7 +52,7 @@ def tradeoff(
     scene: Annotated[
         Path | None, typer.Argument(help="Scene file: errors are seen on its pixels, and fits are to its references.")
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    output: Output = Path("out"),
     lights: Annotated[int, typer.Option(min=1, max=8, help="Lights under which shaders are timed.")] = 1,
     rounds: Annotated[int, typer.Option(min=3, help="Rounds in which all shaders, and Phong, are timed.")] = 30,
     paths: Annotated[
@@ -98,7 +98,7 @@ def _part(text: str) -> float:
 def specialise(
     preset: Preset,
     scene: Scene,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    output: Output = Path("out"),
     tolerance: Annotated[
         float, typer.Option(parser=_part, metavar="PART", help="By how much the error of the image may grow: 0.5% or 0.005.")
     ] = 0.005,
@@ -133,7 +133,7 @@ def stability(
     word: Annotated[
         str, typer.Argument(help="Part of the name of structures: precise, conductor, patina. Left out: all of them.")
     ] = "",
-    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out"),
+    output: Output = Path("out"),
     corners: Annotated[int, typer.Option(min=2, max=65536, help="Corners of the ranges of a structure, at most.")] = 128,
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of the corners that are drawn.")] = 0,
     shaders: Annotated[bool, typer.Option(help="Draw the printed shaders too.")] = True,

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from .app import Json, app, emit, progress, say, stderr
+from .app import Json, Output, app, emit, progress, say, stderr
 
 
 @app.command()
@@ -117,7 +117,7 @@ def inspect(
 
 @app.command()
 def demo(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the results.")] = Path("out/demo"),
+    output: Output = Path("out/demo"),
 ) -> None:
     """Fit the references that layerfit ships, verify their shaders, and say where the pictures are.
 

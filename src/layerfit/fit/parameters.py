@@ -79,7 +79,7 @@ class Parametrisation:
             if f.layer is None:
                 continue
             layers[f.layer] = dataclasses.replace(layers[f.layer], **{f.field: f.from_steps(u, xp)})
-        return dataclasses.replace(stack, layers=tuple(layers[:-1]), base=layers[-1])
+        return stack.with_parts(layers)
 
     def light(self, fields: Sequence[Any], xp: Any = jnp) -> Any:
         """What the lights of the scene are multiplied by, one a channel; None where they are known."""
@@ -134,7 +134,7 @@ def with_fixed(stack: Stack, fixed: Mapping[str, Any], where: str) -> Stack:
         if array is None or np.any(array < spec.lower) or np.any(array > spec.upper):
             raise InputError(f"{where}: {name} = {value!r} should be a number from {spec.lower:g} to {spec.upper:g}")
         layers[k] = dataclasses.replace(layers[k], **{field: array})
-    return dataclasses.replace(stack, layers=tuple(layers[:-1]), base=layers[-1])
+    return stack.with_parts(layers)
 
 
 def _is_number(value: Any, spec: Param) -> bool:
@@ -167,4 +167,4 @@ def parametrise(stack: Stack, free: Sequence[str] | None, fixed: Sequence[str], 
         width = 3 if spec.colour else 1
         chosen.append(Free(name, k, field, spec, tuple(range(slot, slot + width))))
         slot += width
-    return dataclasses.replace(stack, layers=tuple(layers[:-1]), base=layers[-1]), Parametrisation(tuple(chosen))
+    return stack.with_parts(layers), Parametrisation(tuple(chosen))

@@ -28,8 +28,7 @@ def scaled(stack: Stack, scale: Any) -> Stack:
     def thicker(layer: Any, factor: Any) -> Any:
         return dataclasses.replace(layer, **{name: getattr(layer, name) * factor for name in depths(layer)})
 
-    *layers, base = (thicker(layer, scale[k]) for k, layer in enumerate((*stack.layers, stack.base)))
-    return dataclasses.replace(stack, layers=tuple(layers), base=base)
+    return stack.with_parts([thicker(layer, scale[k]) for k, layer in enumerate((*stack.layers, stack.base))])
 
 
 def _material(u: Any, start: Stack, scale: Any, *, free: Parametrisation) -> tuple[Any, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .._directions import random_pairs as random_pairs
+from .._directions import FLOOR as FLOOR, random_pairs as random_pairs
 from .._place import Place
 from ..documents import finite
 from ..render import predict
@@ -16,9 +16,6 @@ from .gl import renderer, shade_points
 MAX_REL = 5e-5
 P999_REL = 1e-5
 """What printed float32 arithmetic may differ by: rounding, and a driver's exp that is 17 units in the last place off."""
-
-FLOOR = 1e-4
-"""Values below this part of a lit diffuse surface (for images: of white) are compared absolutely."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,11 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._compiled import fusion_emitters
+from .._directions import FLOOR as OF_WHITE
 from ..stack import Stack, evaluate
 from .grid import Grid
 
-FLOOR = 1e-4 / np.pi
-"""Values below it [1/sr], 1e-4 of a white diffuse surface, are compared absolutely."""
+FLOOR = OF_WHITE / np.pi
+"""Values [1/sr] below it are compared absolutely."""
 SLOPE_FLOOR = 1e-2
 """Derivatives below this part of the value are compared with that: in the coordinate of a fit both have one unit."""
 
@@ -47,8 +48,7 @@ def _forwards(*inputs: Any) -> Any:
     leaves, structure = jax.tree.flatten(inputs)
     tangents = [jnp.stack([jnp.full_like(x, j == k) for k in range(len(leaves))]) for j, x in enumerate(leaves)]
     along = lambda t: jax.jvp(_values, inputs, jax.tree.unflatten(structure, t))  # noqa: E731
-    f, slopes = jax.vmap(along)(tangents)
-    return f[0], slopes
+    return jax.vmap(along, out_axes=(None, 0))(tangents)
 
 
 def _values(stack: Stack, wi: Any, wo: Any) -> Any:

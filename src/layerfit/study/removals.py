@@ -42,7 +42,7 @@ def removals(stack: Stack) -> list[Removal]:
 def _with(stack: Stack, place: int, layer: Any) -> Stack:
     layers = [*stack.layers, stack.base]
     layers[place] = layer
-    return dataclasses.replace(stack, layers=tuple(layers[:-1]), base=layers[-1])
+    return stack.with_parts(layers)
 
 
 def _simpler(layer: Any) -> Iterator[tuple[str, Any, tuple[str, ...]]]:

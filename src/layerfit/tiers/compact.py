@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._directions import random_pairs
+from .._directions import FLOOR as OF_WHITE, random_pairs
 from ..forms.corrected import Corrected
 from ..forms.precise import Precise
 from ..render import brdf
@@ -25,8 +25,8 @@ from .surface import Compact, Recipe, noted, plain
 PAIRS = 16384
 """Pairs of directions that the error is measured over, random and extreme."""
 
-FLOOR = 1e-4 / np.pi
-"""Values below this part of a white diffuse surface are compared absolutely."""
+FLOOR = OF_WHITE / np.pi
+"""Values [1/sr] below it are compared absolutely."""
 
 MARGIN = (0.9, 0.7, 0.5)
 """Part of the error asked for to which the degrees are lowered: less, where other pairs then show more."""
