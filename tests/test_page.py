@@ -208,7 +208,7 @@ def test_pictures_are_compared_pixel_by_pixel(report, pair):
     said = report.locator(".said").inner_text()
     want = pair.reference[10, 22]
     assert said.startswith("x 22, y 10: reference " + " ".join(f"{v:.3f}"[:4] for v in want)[:4])
-    assert f"apart {100 * 0.1 * want.mean() / 1.5:.2f}"[:9] in said
+    assert f"the fit is off by {100 * 0.1 * want.mean() / 1.5:.2f}"[:21] in said
     colour = "(at) => { const c = document.querySelector('[data-compare] canvas'); return Array.from(c.getContext('2d').getImageData(...at, 1, 1).data); }"  # noqa: E501
     left, right = (evaluated(report, colour, [x, 10])[:3] for x in (3, 27))
     np.testing.assert_allclose(left, 255.0 * display(pair.reference[10, 3], 1.5), atol=1.0)

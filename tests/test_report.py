@@ -180,17 +180,30 @@ def test_false_colours_grow_brighter():
     assert luminance[-1] > 0.9
 
 
+def test_colours_of_a_signed_difference_are_dark_at_zero_and_grow_brighter_both_ways():
+    colours = pictures.false_colour(np.linspace(0.0, 1.0, 101)[None], pictures.SIGNED)[0]
+    luminance = colours @ [0.2126, 0.7152, 0.0722]
+    assert np.all(np.diff(luminance[:51]) <= 0.0)
+    assert np.all(np.diff(luminance[50:]) >= 0.0)
+    assert luminance[50] < 0.02
+    blue, orange = colours[:50, 2] - colours[:50, 0], colours[51:, 0] - colours[51:, 2]
+    assert min(blue.min(), orange.min()) > 0.0
+
+
 def test_a_difference_ends_its_scale_at_the_99th_percentile_and_greys_what_is_left_out():
     reference = np.zeros((10, 10, 3))
     image = np.zeros((10, 10, 3))
     image[:, 5:] = 0.02
+    image[5, 5:] = -0.02
     image[0, 0] = np.nan
     covered = np.ones((10, 10), bool)
     covered[9] = False
     panel = pictures.difference(image, reference, 2.0, covered)
     assert panel.scale == "1 % of white"
     assert np.ptp(panel.image[9]) == 0.0
-    assert np.all(panel.image[5, 7] > panel.image[5, 2])
+    np.testing.assert_allclose(panel.image[4, 7], pictures.SIGNED[-1])
+    np.testing.assert_allclose(panel.image[5, 7], pictures.SIGNED[0])
+    np.testing.assert_allclose(panel.image[5, 2], pictures.SIGNED[3])
     assert np.all(np.isfinite(panel.image))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .pictures import RAMP, top
+from .pictures import SIGNED, top
 
 PIXELS = 90_000
 """Of all the references of a page together: larger ones are shown smaller, by the mean of whole blocks."""
@@ -68,7 +68,7 @@ def _place(pair: Pair, name: str, block: int) -> str:
         "height": height,
         "white": pair.white,
         "scale": top(pair.fit, pair.reference, pair.white, pair.covered),
-        "ramp": RAMP.round(4).tolist(),
+        "ramp": SIGNED.round(4).tolist(),
         "pixels": name,
     }
     smaller = f" (one pixel here for {block} by {block})" if block > 1 else ""

@@ -19,6 +19,8 @@ class Panel:
     """sRGB, (H, W, 3) in [0, 1]."""
     scale: str = ""
     """What the bright end of the false colours stands for; empty for a picture in its own colours."""
+    signed: bool = False
+    """Whether they have two ends, the other for as much below 0."""
 
 
 _Font = ImageFont.FreeTypeFont | ImageFont.ImageFont  # the second where Pillow comes without FreeType
@@ -28,6 +30,12 @@ RAMP = (
 )
 """Dark to bright through violet and orange: even in lightness, and readable without colour vision."""
 
+SIGNED = (
+    np.array([[158, 210, 255], [66, 146, 226], [27, 78, 138], [0, 0, 4], [138, 60, 18], [226, 122, 44], [255, 218, 160]])
+    / 255.0
+)
+"""Light blue below 0, dark at 0, light orange above: the two are told apart without colour vision of red and green."""
+
 BACKGROUND, INK, LINE = (24, 24, 27), (228, 228, 231), (63, 63, 70)
 _NOT_COMPARED = 0.3
 """Grey of pixels that a difference leaves out: no colour of the ramp."""
@@ -36,28 +44,26 @@ _SIDE = 256
 _GAP, _LINE_HEIGHT = 8, 22
 
 
-def false_colour(values: np.ndarray) -> np.ndarray:
+def false_colour(values: np.ndarray, ramp: np.ndarray = RAMP) -> np.ndarray:
     """Values (H, W) in [0, 1] as colours."""
-    x = np.clip(values, 0.0, 1.0) * (len(RAMP) - 1)
-    low = np.minimum(x.astype(int), len(RAMP) - 2)
+    x = np.clip(values, 0.0, 1.0) * (len(ramp) - 1)
+    low = np.minimum(x.astype(int), len(ramp) - 2)
     t = (x - low)[..., None]
-    return RAMP[low] * (1.0 - t) + RAMP[low + 1] * t
+    return ramp[low] * (1.0 - t) + ramp[low + 1] * t
 
 
 def difference(image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray) -> Panel:
-    """Absolute difference of two linear images in false colour; its scale ends at the 99th percentile."""
-    error, end = _error(image, reference, white, covered), top(image, reference, white, covered)
-    picture = np.where(covered[..., None], false_colour(error / end), _NOT_COMPARED)
-    return Panel("difference", picture, f"{100.0 * end:.2g} % of white")
+    """Difference of two linear images, the mean over the channels with its sign, in false colour: orange where the image is too bright, blue
+    where it is too dark. Its scale ends at the 99th percentile of its size."""
+    end = top(image, reference, white, covered)
+    error = np.where(covered, np.nan_to_num(np.mean(image - reference, -1)), 0.0) / white
+    picture = np.where(covered[..., None], false_colour(0.5 + 0.5 * error / end, SIGNED), _NOT_COMPARED)
+    return Panel("difference (orange: too bright)", picture, f"{100.0 * end:.2g} % of white", signed=True)
 
 
 def top(image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray) -> float:
-    """End of the scale of a difference, in parts of white."""
-    return max(float(np.quantile(_error(image, reference, white, covered)[covered], 0.99)), 1e-6)
-
-
-def _error(image: np.ndarray, reference: np.ndarray, white: float, covered: np.ndarray) -> np.ndarray:
-    return np.where(covered, np.nan_to_num(np.mean(np.abs(image - reference), -1)), 0.0) / white
+    """End of the scale of a difference, in parts of white: the same for all channels and for their mean."""
+    return max(float(np.quantile(np.nan_to_num(np.mean(np.abs(image - reference), -1))[covered], 0.99)) / white, 1e-6)
 
 
 def shown(caption: str, image: np.ndarray, white: float) -> Panel:
@@ -83,7 +89,7 @@ def strip(rows: Sequence[Sequence[Panel]]) -> bytes:
             picture = _fitted(panel.image, width, height)
             canvas.paste(picture, (x, y + _LINE_HEIGHT))
             if panel.scale:
-                _draw_scale(canvas, draw, (x, y + _LINE_HEIGHT + height + 5), width, panel.scale, font)
+                _draw_scale(canvas, draw, (x, y + _LINE_HEIGHT + height + 5), width, panel, font)
     return png(canvas)
 
 
@@ -104,12 +110,15 @@ def _fitting(draw: ImageDraw.ImageDraw, text: str, width: int, font: _Font) -> s
     return f"{text}..."
 
 
-def _draw_scale(canvas: Image.Image, draw: ImageDraw.ImageDraw, at: tuple[int, int], width: int, end: str, font: _Font) -> None:
-    """The false colours from 0 to their end, in a line, and the grey of what was not compared."""
+def _draw_scale(
+    canvas: Image.Image, draw: ImageDraw.ImageDraw, at: tuple[int, int], width: int, panel: Panel, font: _Font
+) -> None:
+    """The false colours from end to end, in a line, and the grey of what was not compared."""
     x, y = at
     bar = max(24, width // 3 - 20)
-    colours = np.repeat(false_colour(np.linspace(0.0, 1.0, bar))[None], 10, 0)
-    draw.text((x, y - 3), "0", fill=INK, font=font)
+    ramp, start, end = (SIGNED, "\N{MINUS SIGN}", f"+ {panel.scale}") if panel.signed else (RAMP, "0", panel.scale)
+    colours = np.repeat(false_colour(np.linspace(0.0, 1.0, bar), ramp)[None], 10, 0)
+    draw.text((x, y - 3), start, fill=INK, font=font)
     canvas.paste(Image.fromarray((colours * 255.0 + 0.5).astype(np.uint8)), (x + 12, y))
     draw.text((x + bar + 18, y - 3), end, fill=INK, font=font)
     text, grey = "left out", round(255 * _NOT_COMPARED)

@@ -23,21 +23,24 @@ function ramp(colours, t) {
   return colours[low].map((c, k) => 255 * (c + (x - low) * (colours[low + 1][k] - c)));
 }
 
-// `data`: name, width, height, white, scale (the end of the false colours, of white), ramp; `pixels`: reference, then fit, NaN where not compared.
+const CHANNELS = ["mean of the channels", "red", "green", "blue"];
+
+// `data`: name, width, height, white, scale (the end of the false colours, of white), ramp (below 0 to above); `pixels`: reference, then fit, NaN where not compared.
 function compare(place, data, bytes) {
   const { width, height, white } = data;
   const all = floats(bytes);
   const count = 3 * width * height;
   const [reference, fit] = [all.subarray(0, count), all.subarray(count, 2 * count)];
   const compared = all.subarray(2 * count);
-  const state = { split: 0.5, exposure: 0, top: data.scale, signed: false };
+  const state = { split: 0.5, exposure: 0, top: data.scale, channel: 0 };
   const canvases = [0, 1].map(() => element("canvas", { width, height, tabIndex: 0, role: "img" }));
   const [swept, differing] = canvases;
   swept.setAttribute("aria-label", `${data.name}: reference left, fit right of the line; arrow keys move it`);
-  differing.setAttribute("aria-label", `${data.name}: difference of fit and reference in false colours`);
+  differing.setAttribute("aria-label", `${data.name}: fit less reference in false colours`);
   const said = element("output", { className: "said", textContent: "Point at a pixel to read it." });
 
-  const error = (k) => (Math.abs(fit[k] - reference[k]) + Math.abs(fit[k + 1] - reference[k + 1]) + Math.abs(fit[k + 2] - reference[k + 2])) / 3 / white;
+  const apart = (k) => (fit[k] - reference[k]) / white;
+  const error = (k) => (state.channel ? apart(k + state.channel - 1) : (apart(k) + apart(k + 1) + apart(k + 2)) / 3);
   const paint = (canvas, colour) => {
     const image = new ImageData(width, height);
     for (let n = 0; n < width * height; n++) image.data.set([...colour(3 * n, n), 255], 4 * n);
@@ -51,7 +54,7 @@ function compare(place, data, bytes) {
       return n % width === edge ? [255, 255, 255] : [0, 1, 2].map((c) => encoded(gain * from[k + c]));
     });
   };
-  const drawDifference = () => paint(differing, (k, n) => (compared[n] ? ramp(data.ramp, error(k) / state.top) : [77, 77, 77]));
+  const drawDifference = () => paint(differing, (k, n) => (compared[n] ? ramp(data.ramp, 0.5 + 0.5 * error(k) / state.top) : [77, 77, 77]));
 
   const split = (x) => { state.split = clamp(x, 0, 1); draw(); };
   const pixelAt = (event) => {
@@ -67,14 +70,14 @@ function compare(place, data, bytes) {
     const [x, y] = pixelAt(event).map((t, k) => clamp(Math.floor(t * [width, height][k]), 0, [width, height][k] - 1));
     const [n, k] = [y * width + x, 3 * (y * width + x)];
     const three = (from) => Array.from(from.subarray(k, k + 3), digits).join(" ");
-    said.textContent = `x ${x}, y ${y}: reference ${three(reference)}, fit ${three(fit)}${compared[n] ? `, apart ${digits(100 * error(k))} % of white` : ", not compared"}`;
+    said.textContent = `x ${x}, y ${y}: reference ${three(reference)}, fit ${three(fit)}${compared[n] ? `, the fit is off by ${digits(100 * error(k))} % of white` : ", not compared"}`;
   }));
 
   const bar = element("canvas", { width: 256, height: 1, className: "bar" });
   const ends = element("span", {});
   const rescale = (x) => {
     state.top = data.scale * 2 ** x;
-    ends.textContent = `0 to ${digits(100 * state.top)} % of white; grey: not compared`;
+    ends.textContent = `fit too dark (blue) to too bright (orange), ${digits(100 * state.top)} % of white each way; grey: not compared`;
     drawDifference();
   };
   const line = new ImageData(256, 1);
@@ -84,7 +87,8 @@ function compare(place, data, bytes) {
     element("div", { className: "pair" },
       element("figure", {}, swept, element("figcaption", { className: "ends" }, element("span", { textContent: "reference" }), element("span", { textContent: "fit (its shader)" }))),
       element("figure", {}, differing, element("figcaption", {}, bar, ends))),
-    element("div", { className: "look" }, range("exposure", -6, 6, 0, (x) => { state.exposure = x; draw(); }), range("end of the scale, 2^", -5, 5, 0, rescale)),
+    element("div", { className: "look" }, range("exposure", -6, 6, 0, (x) => { state.exposure = x; draw(); }), range("end of the scale, 2^", -5, 5, 0, rescale),
+      choice("difference of", CHANNELS, (k) => { state.channel = k; drawDifference(); })),
     said,
   );
   draw();
