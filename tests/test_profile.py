@@ -10,10 +10,11 @@ from layerfit.errors import InputError
 from layerfit.fit.fit import fit
 from layerfit.fit.profile import along, lower_limit, scatter, threshold
 from layerfit.fit.result import to_json
+from layerfit.fit.starts import Minimum
 from layerfit.fit.words import parameters as said
 from layerfit.layers import Coat
 from layerfit.stack import Stack
-from layerfit.surfaces import Conductor
+from layerfit.surfaces import Conductor, Lambert
 
 GRAM = np.array([[2.0, 1.2], [1.2, 1.0]])
 ORIGIN = np.array([1.0, -2.0])
@@ -25,14 +26,17 @@ def parabola(u, slot):
     other = 1 - slot
     away = u - ORIGIN
     away[other] = -GRAM[other, slot] / GRAM[other, other] * away[slot]
-    return ORIGIN + away, float(0.5 * away @ GRAM @ away)
+    return Minimum((0,), ORIGIN + away, float(0.5 * away @ GRAM @ away), GRAM)
+
+
+BEST = Minimum((0,), ORIGIN, 0.0, GRAM)
 
 
 @pytest.mark.parametrize("slot", [0, 1])
 @pytest.mark.parametrize("first", [0.01, 0.3, 2.0])
 def test_the_interval_of_a_parabola_is_that_of_its_inverse(slot, first):
     limit = 0.5 * 3.841
-    found = along(parabola, ORIGIN, 0.0, slot, first, limit, WIDE)
+    found = along(parabola, BEST, slot, first, limit, WIDE)
     half = np.sqrt(2.0 * limit * np.linalg.inv(GRAM)[slot, slot])
     np.testing.assert_allclose(found.interval, (ORIGIN[slot] - half, ORIGIN[slot] + half), rtol=1e-6)
     assert np.all(np.diff(found.at) > 0.0)
@@ -40,21 +44,39 @@ def test_the_interval_of_a_parabola_is_that_of_its_inverse(slot, first):
 
 def flat(u, slot):
     """A cost that does not care how large the first entry is, once it is."""
-    return u, float(np.exp(-2.0 * u[0]))
+    return Minimum((0,), u, float(np.exp(-2.0 * u[0])), np.zeros((2, 2)))
 
 
 def test_a_side_that_does_not_rise_has_no_end():
-    u, cost = np.array([4.0, 0.0]), float(np.exp(-8.0))
-    lower, upper = along(flat, u, cost, 0, 0.1, 0.1, (0.0, 10.0)).interval
+    best = flat(np.array([4.0, 0.0]), 0)
+    lower, upper = along(flat, best, 0, 0.1, 0.1, (0.0, 10.0)).interval
     assert upper is None
     assert lower == pytest.approx(-0.5 * np.log(0.1), rel=0.05)
-    found = lower_limit(flat, u, cost, 0, 0.1, 0.1, (0.0, 10.0))
+    found = lower_limit(flat, best, 0, 0.1, 0.1, (0.0, 10.0), np.ones(2))
     assert found is not None
     assert found.interval == pytest.approx((lower, None))
 
 
+def black(u, slot):
+    """A base of any colour below an absorbing coat, of which no light comes back: what is left of it is exp(-2 depth)."""
+    return Minimum((0,), np.array([u[0], 0.0]), 0.0, np.diag([0.0, 1e4 * np.exp(-4.0 * u[0])]))
+
+
+@pytest.mark.parametrize("fitted", [0.1, 3.0])
+def test_what_hides_any_base_is_deep_and_not_over_a_black_one(fitted):
+    """The cost is the same everywhere. Integrated over the colour, 1 / sqrt(1 + (100 exp(-2 depth))^2 / 12) is left of the likelihood."""
+    best = black(np.array([fitted, 0.0]), 0)
+    limit = threshold(1.0, 0.0)
+    found = lower_limit(black, best, 0, 0.1, limit, (0.0, 10.0), np.ones(2))
+    assert found.integrated
+    lower, upper = found.interval
+    left = np.exp(-0.5 * 3.841)
+    assert upper is None
+    assert lower == pytest.approx(-0.25 * np.log(12e-4 * (1.0 / left**2 - 1.0)), rel=0.02)
+
+
 def test_what_is_seen_is_no_lower_limit():
-    assert lower_limit(parabola, ORIGIN, 0.0, 0, 0.1, 1.0, WIDE) is None
+    assert lower_limit(parabola, BEST, 0, 0.1, 1.0, WIDE, np.ones(2)) is None
 
 
 def test_the_threshold_is_of_chi_square_and_of_what_no_noise_explains():
@@ -112,6 +134,26 @@ def test_below_a_coat_that_may_be_opaque_nothing_is_known(tmp_path):
     assert {"lower_limit:coat.tau", "not_identifiable:base.alpha"} <= set(document["flags"])
     assert document["parameters"]["base.alpha"]["sigma"] is None
     assert document["parameters"]["coat.eta"]["sigma"] > 0.0
+
+
+def test_a_depth_over_a_base_that_could_be_black_is_a_lower_limit_with_a_note(tmp_path):
+    """No light comes back from a Lambert base at this depth; a fit of its colour and the depth ends anywhere."""
+    stack = dataclasses.replace(
+        DEEP, layers=(dataclasses.replace(DEEP.layers[0], tau=np.full(3, 5.0)),), base=Lambert(albedo=[0.5, 0.3, 0.6])
+    )
+    view = sphere_view(stack, tmp_path, 24)
+    noise = 0.02 * view.target**0.7
+    noisy = view.target + noise * np.random.default_rng(0).normal(size=noise.shape)
+    black = dataclasses.replace(
+        stack, layers=(dataclasses.replace(DEEP.layers[0], tau=np.full(3, 0.3)),), base=Lambert(albedo=0.02)
+    )
+    result = fit([dataclasses.replace(view, target=noisy, noise=noise)], black, free=["coat.tau", "base.albedo"], starts=1)
+    document = to_json(result, {}, None, {}, "preset.json")
+    assert "lower_limit:coat.tau" in document["flags"]
+    for lower, upper in document["parameters"]["coat.tau"]["interval_95"]:
+        assert upper is None
+        assert 1.0 < lower < 5.0
+    assert any("coat.tau is a lower limit if what lies below is not black" in note for note in document["notes"])
 
 
 def test_an_interval_that_is_asked_for_holds_the_truth(result):

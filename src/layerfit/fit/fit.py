@@ -208,7 +208,9 @@ class _Fit:
         residuals = sum(s.target.size for s in problem.samples)
         unexplained, even = 0.5 * misfit**2 * problem.shine(problem.blocks), 2.0 * best.cost / residuals
         asked = [slot for f in problem.free.free if f.name in self.profile for slot in f.slots]
-        deeper = [slot for slot in deep(problem.free.free, problem.material(best.vector)) if slot not in asked]
+        deeper = [
+            slot for slot in deep(problem.free.free, problem.material(best.vector), uncertainty.sigma) if slot not in asked
+        ]
         hides = {
             slot: form[k] if len(f.slots) == 3 else form.sum() for f in problem.free.free for k, slot in enumerate(f.slots)
         }
@@ -217,10 +219,17 @@ class _Fit:
         for slot in (*asked, *deeper):
             lower, upper = problem.bounds[0][slot], problem.bounds[1][slot]
             first = float(np.clip(uncertainty.sigma[slot], 1e-3 * (upper - lower), 0.03 * (upper - lower)))
-            run = along if slot in asked else lower_limit
             limit = threshold(max(even, scatter(best.gram, uncertainty.covariance, slot)), unexplained, hides[slot]) + 1e-30
-            profile = run(problem.refit, best.vector, best.cost, slot, first, limit, (lower, upper))
+            how = (problem.refit, best, slot, first, limit, (lower, upper))
+            profile = along(*how) if slot in asked else lower_limit(*how, problem.bounds[1] - problem.bounds[0])
             found += [profile] if profile else []
+        names = {
+            f.name for f in problem.free.free for p in found if p.integrated and p.slot in f.slots and p.interval[0] is not None
+        }
+        self.notes += [
+            f"{name} is a lower limit if what lies below is not black: that would look alike at any depth"
+            for name in sorted(names)
+        ]
         return found, self._hidden(best, found, threshold(widest, unexplained, form.sum(), 3) + 1e-30)
 
     def _hidden(self, best: Minimum, profiles: Sequence[Profile], limit: float) -> list[str]:
@@ -231,7 +240,7 @@ class _Fit:
             if f.field in ABSORBING and f.layer is not None and limits.issuperset(f.slots):
                 opaque = np.array(best.vector)
                 opaque[list(f.slots)] = problem.bounds[1][list(f.slots)]
-                if problem.refit(opaque, f.slots)[1] - best.cost < limit:
+                if problem.refit(opaque, f.slots).cost - best.cost < limit:
                     return [below.name for below in problem.free.free if below.layer is not None and below.layer > f.layer]
         return []
 

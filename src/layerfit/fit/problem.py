@@ -160,8 +160,8 @@ class Problem:
     def shine(self, blocks: Sequence[Block]) -> float:
         return sum(self.brightness[: len(blocks)])
 
-    def refit(self, u: np.ndarray, slots: int | Sequence[int]) -> tuple[np.ndarray, float]:
-        """Where all but some entries of the vector go from there, and the cost."""
+    def refit(self, u: np.ndarray, slots: int | Sequence[int]) -> Minimum:
+        """Where all but some entries of the vector go from there."""
         kept = self.bounds
         still = np.isin(np.arange(len(u)), slots)
         self.bounds = np.where(still, u, kept[0]), np.where(still, u, kept[1])
@@ -169,7 +169,7 @@ class Problem:
         reached, _ = self.descend(Minimum((0,), u, np.inf, np.eye(len(u))), self.blocks, FINE_STEPS, "profile")
         self.bounds = kept
         del self.trace[steps:]  # the fit had ended
-        return reached.vector, reached.cost
+        return reached
 
     def glance(self, u: np.ndarray) -> float:
         """Cost of the first block of each reference at a point, without derivatives."""

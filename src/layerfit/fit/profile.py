@@ -5,14 +5,14 @@ hardly tell apart, the profile of the cost says how far a value can go (Venzon a
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ..stack import Stack
 from .parameters import Free
-from .starts import SIGHT
-from .uncertainty import BLIND
+from .starts import SIGHT, Minimum
+from .uncertainty import BLIND, WEAK_SIGMA
 
 CHI2_95 = {1: 3.841, 3: 7.815}
 """Rise of chi^2 within which the true values of so many parameters lie 95 times of 100 (Wilks 1938)."""
@@ -32,8 +32,11 @@ CLOSER = 2
 NEAR = 0.01
 """Part of the rise within which they are there."""
 
-Refit = Callable[[np.ndarray, int], tuple[np.ndarray, float]]
-"""From a vector, with one of its entries held as it is: where the others go, and the cost there."""
+Refit = Callable[[np.ndarray, int], Minimum]
+"""From a vector, with one of its entries held as it is: where the others go."""
+
+Rise = Callable[[Minimum], float]
+"""How much worse a point is than the minimum, over what ends an interval."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Profile:
     """(points,) where it was held, ascending."""
     rise: np.ndarray
     """(points,) of the cost, over the rise that ends the interval: 1 there."""
+    integrated: bool = False
+    """Whether the other parameters are integrated over their ranges, not fitted again."""
 
     @property
     def interval(self) -> tuple[float | None, float | None]:
@@ -81,31 +86,35 @@ def scatter(gram: np.ndarray, covariance: np.ndarray, slot: int) -> float:
     return float(covariance[slot, slot] / unit)
 
 
-def along(
-    refit: Refit, u: np.ndarray, cost: float, slot: int, first: float, limit: float, bounds: tuple[float, float]
-) -> Profile:
+def along(refit: Refit, best: Minimum, slot: int, first: float, limit: float, bounds: tuple[float, float]) -> Profile:
     """The profile of one entry of the vector from its minimum to both sides, in growing steps from `first` on."""
-    found = [(float(u[slot]), 0.0)]
+
+    def rise(there: Minimum) -> float:
+        return (there.cost - best.cost) / limit
+
+    found = [(float(best.vector[slot]), 0.0)]
     for bound, step in zip(bounds, (-first, first), strict=True):
-        found += _side(refit, u, cost, slot, step, limit, bound)
+        found += _side(refit, best, slot, step, rise, bound)
+    return _profile(slot, found)
+
+
+def _profile(slot: int, found: Sequence[tuple[float, float]], integrated: bool = False) -> Profile:
     at, rise = np.array(sorted(found)).T
-    return Profile(slot, at, rise)
+    return Profile(slot, at, rise, integrated)
 
 
-def _side(
-    refit: Refit, u: np.ndarray, cost: float, slot: int, step: float, limit: float, bound: float
-) -> list[tuple[float, float]]:
-    here, inside, found = u, (float(u[slot]), 0.0), []
-    low, high = sorted((float(u[slot]), bound))
+def _side(refit: Refit, start: Minimum, slot: int, step: float, rise: Rise, bound: float) -> list[tuple[float, float]]:
+    here, inside, found = start.vector, (float(start.vector[slot]), rise(start)), []
+    low, high = sorted((inside[0], bound))
 
     def look(value: float) -> tuple[float, float]:
         nonlocal here
-        there, reached = refit(_held(here, slot, value), slot)
-        if reached - cost >= limit:  # an end is one if it is so from the minimum, too: from here the others may be far out
-            there, reached = min((there, reached), refit(_held(u, slot, value), slot), key=lambda end: end[1])
-        if reached - cost < limit:
-            here = there
-        found.append((value, (reached - cost) / limit))
+        there = refit(_held(here, slot, value), slot)
+        if rise(there) >= 1.0:  # an end is one if it is so from the start, too: from here the others may be far out
+            there = min(there, refit(_held(start.vector, slot, value), slot), key=rise)
+        if rise(there) < 1.0:
+            here = there.vector
+        found.append((value, rise(there)))
         return found[-1]
 
     while len(found) < POINTS and inside[0] != bound:
@@ -132,8 +141,8 @@ def _held(u: np.ndarray, slot: int, value: float) -> np.ndarray:
     return np.where(np.arange(len(u)) == slot, value, u)
 
 
-def deep(free: tuple[Free, ...], stack: Stack) -> list[int]:
-    """Entries of the vector that are optical depths so large that the base may not be seen."""
+def deep(free: tuple[Free, ...], stack: Stack, sigma: np.ndarray) -> list[int]:
+    """Entries of the vector that are optical depths so large, or known so badly, that the base may not be seen."""
     layers = (*stack.layers, stack.base)
     slots = []
     for f in free:
@@ -143,19 +152,43 @@ def deep(free: tuple[Free, ...], stack: Stack) -> list[int]:
             and (depth := getattr(layers[f.layer], "optical_depth", None)) is not None
         ):
             depths = np.broadcast_to(np.asarray(depth, float), 3)
-            slots += [slot for slot, value in zip(f.slots, depths, strict=True) if value >= DEEP]
+            slots += [
+                slot for slot, value in zip(f.slots, depths, strict=True) if value >= DEEP or not sigma[slot] < WEAK_SIGMA
+            ]
     return slots
 
 
 def lower_limit(
-    refit: Refit, u: np.ndarray, cost: float, slot: int, first: float, limit: float, bounds: tuple[float, float]
+    refit: Refit, best: Minimum, slot: int, first: float, limit: float, bounds: tuple[float, float], widths: np.ndarray
 ) -> Profile | None:
-    """The lower side of a profile, where an opaque coat cannot be told from this one; None where the images tell them apart."""
-    rise = (refit(_held(u, slot, bounds[1]), slot)[1] - cost) / limit
-    if rise >= 1.0:
+    """The lower side of a profile, where an opaque coat cannot be told from this one; None where the images tell them apart.
+
+    It may have no end: over a base that is black enough, any coat looks opaque. But that base is one of many that an opaque coat hides. So
+    then the likelihood is integrated over the other parameters, each as likely everywhere in its range, of these `widths` (Berger, Liseo and
+    Wolpert 1999), by Laplace's method (Tierney and Kadane 1986).
+    """
+    lower, upper = bounds
+    opaque = refit(_held(best.vector, slot, upper), slot)
+    others = np.delete(np.arange(len(widths)), slot)
+    chi2 = 0.5 * CHI2_95[1]
+
+    def dearer(there: Minimum) -> float:
+        return (there.cost - best.cost) / limit
+
+    def confined(there: Minimum) -> float:
+        """Logarithm of their ranges over what is left of them to the others."""
+        known = there.gram[np.ix_(others, others)] * np.outer(widths[others], widths[others]) / 12.0
+        return 0.5 * float(np.linalg.slogdet(np.eye(len(others)) + known * chi2 / limit)[1])
+
+    def rarer(there: Minimum) -> float:
+        return dearer(there) + (confined(there) - confined(opaque)) / chi2
+
+    def down(rise: Rise) -> Profile:
+        start = best if rise(best) < 1.0 else opaque  # the limit may lie above what was fitted
+        found = {float(m.vector[slot]): rise(m) for m in (best, opaque)}
+        return _profile(slot, [*found.items(), *_side(refit, start, slot, -first, rise, lower)], rise is rarer)
+
+    if dearer(opaque) >= 1.0:
         return None
-    found = [(float(u[slot]), 0.0), *_side(refit, u, cost, slot, -first, limit, bounds[0])]
-    if u[slot] < bounds[1]:
-        found.append((bounds[1], rise))
-    at, rises = np.array(sorted(found)).T
-    return Profile(slot, at, rises)
+    profile = down(dearer)
+    return profile if profile.interval[0] is not None else down(rarer)
