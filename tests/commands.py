@@ -5,6 +5,7 @@ import dataclasses
 import io
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -13,9 +14,10 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
+import typer.main
 
 from layerfit.capture.exr import write_exr
-from layerfit.cli import main
+from layerfit.cli import app, main
 
 SIDE = 48
 
@@ -85,8 +87,29 @@ def layerfit(*arguments: Any) -> Ran:
         try:
             main()
         except SystemExit as end:
-            return Ran(int(end.code or 0), out.getvalue(), err.getvalue())
+            ran = Ran(int(end.code or 0), out.getvalue(), err.getvalue())
+            check_next(arguments, ran)
+            return ran
     raise AssertionError("the command line did not end by an exit")
+
+
+SILENT = {"--help", "--version", "-q", "--quiet"}
+"""With these a command names no next one."""
+
+
+def check_next(arguments: tuple[Any, ...], ran: Ran) -> None:
+    """A command that has done its work names the next one in its last line, and that is a command."""
+    if ran.code == 2 or SILENT.intersection(arguments):
+        return
+    last = ran.err.rstrip().splitlines()[-1]
+    assert last.startswith("Next: layerfit "), last
+    check_command(shlex.split(last)[2:])
+
+
+def check_command(words: list[str]) -> None:
+    """That words after `layerfit` are a command of it with what it asks for. Raises a usage error where they are not."""
+    known: Any = typer.main.get_command(app)
+    known.commands[words[0]].make_context(words[0], words[1:], resilient_parsing=False)
 
 
 def process(*arguments: Any, environment: Mapping[str, str] | None = None, cwd: Path | None = None) -> Ran:

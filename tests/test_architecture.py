@@ -45,7 +45,7 @@ TOP = [
     {"interchange"},
     {"study"},
     {"report"},
-    {"tabulate", "job", "truth", "structures", "stability", "cache", "view"},
+    {"tabulate", "job", "truth", "structures", "stability", "cache", "view", "doctor"},
     {"batch", "tradeoffs", "specialising"},
     {"demo"},
     {""},

@@ -41,6 +41,7 @@ COMMANDS = (
     "metal",
     "inspect",
     "demo",
+    "doctor",
 )
 
 CONSTANT_LIGHT = """\
@@ -255,7 +256,7 @@ def test_a_shader_with_uniforms(scene):
 def test_verification_passes_and_names_the_worst_value(scene, gl):
     ran = layerfit("verify", scene.parent / "truth.json", "--json")
     assert ran.code == 0, ran.err
-    assert ran.err.rstrip().endswith("PASS")
+    assert ran.err.splitlines()[-2:] == ["PASS", "Next: layerfit export " + str(scene.parent / "truth.json") + " -o truth.frag"]
     assert re.search(r"worst value: [rgb] at wi \(.*\), wo \(.*\): shader \S+, JAX \S+", ran.err)
     document = json.loads(ran.out)
     assert document["passed"] is True
@@ -277,7 +278,7 @@ def test_verification_against_a_reference(scene, gl, tmp_path):
 def test_verification_that_fails_is_a_finding(scene, gl, limit):
     ran = layerfit("verify", scene.parent / "truth.json", limit, "1e-9")
     assert ran.code == 1
-    assert ran.err.rstrip().endswith("FAILURE")
+    assert ran.err.splitlines()[-2:] == ["FAILURE", "Next: layerfit doctor"]
 
 
 def test_a_shader_that_is_not_the_material_is_a_finding(scene, gl, tmp_path, monkeypatch):
@@ -288,7 +289,7 @@ def test_a_shader_that_is_not_the_material_is_a_finding(scene, gl, tmp_path, mon
     ran = layerfit("verify", scene.parent / "truth.json", "--json")
     assert ran.code == 1
     assert "max not finite" in ran.err
-    assert ran.err.rstrip().endswith("FAILURE")
+    assert ran.err.splitlines()[-2:] == ["FAILURE", "Next: layerfit doctor"]
     assert json.loads(ran.out, parse_constant=pytest.fail)["parity"]["max_rel"] is None
     ran = layerfit("fit", scene, "-o", tmp_path, "--json")
     assert ran.code == 1
@@ -318,7 +319,7 @@ def test_an_inspection(scene):
     assert [c["name"] for c in document["channels"]] == ["A", "B", "G", "R"]
     table = layerfit("inspect", scene.parent / "reference.exr")
     assert "R, G, B" in table.out
-    assert table.err == ""
+    assert table.err.startswith("Next: layerfit fit ")
 
 
 def test_a_shipped_reference_by_the_process_itself(gl, tmp_path):

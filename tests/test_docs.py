@@ -13,8 +13,8 @@ from typing import Any
 import gallery
 import manual
 import pytest
-import typer.main
 
+from commands import check_command
 from layerfit.capture.channels import ROLES
 from layerfit.capture.scene import (
     _LIGHTS,
@@ -24,7 +24,6 @@ from layerfit.capture.scene import (
     Sphere,
     read_scene,
 )
-from layerfit.cli import app
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
@@ -145,11 +144,9 @@ def commands(text: str) -> list[list[str]]:
 
 @pytest.mark.parametrize("text", blocks("console", "sh"))
 def test_commands_parse(text):
-    known: Any = typer.main.get_command(app)
     for tool, *words in commands(text):
         if tool == "layerfit":
-            command = known.commands[words[0]]
-            command.make_context(words[0], words[1:])
+            check_command(words)
         elif tool == "make":
             goals = [word for word in words if "=" not in word]
             makefile = (REPOSITORY / "Makefile").read_text()

@@ -4,13 +4,20 @@ import os
 from pathlib import Path
 
 
-def use_compilation_cache() -> Path | None:
-    """Keep traced and compiled functions in the user's cache directory. JAX_COMPILATION_CACHE_DIR chooses another, LAYERFIT_NO_CACHE=1 none."""
+def cache_directory() -> Path | None:
+    """Where traced and compiled functions are kept: JAX_COMPILATION_CACHE_DIR, else the user's cache; None with LAYERFIT_NO_CACHE=1."""
     if os.environ.get("LAYERFIT_NO_CACHE") == "1":
         return None
     from platformdirs import user_cache_path
 
-    directory = Path(os.environ.get("JAX_COMPILATION_CACHE_DIR") or user_cache_path("layerfit") / "jax")
+    return Path(os.environ.get("JAX_COMPILATION_CACHE_DIR") or user_cache_path("layerfit") / "jax")
+
+
+def use_compilation_cache() -> Path | None:
+    """Keep traced and compiled functions in the user's cache directory. JAX_COMPILATION_CACHE_DIR chooses another, LAYERFIT_NO_CACHE=1 none."""
+    directory = cache_directory()
+    if directory is None:
+        return None
     import jax
 
     from ._compiled import KEPT

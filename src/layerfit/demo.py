@@ -1,5 +1,6 @@
 """The demonstration: every shipped reference fitted, its shader verified, its pictures written."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,25 +11,20 @@ from .job import Outcome, Progress, fit_scene
 from .report.text import image_error, relative
 
 
-def run(directory: Path, console: Any, progress: Progress) -> bool:
-    """Fit all shipped references into `directory`, a folder each; prints a line each and where the pictures are."""
+def run(directory: Path, say: Callable[[str], None], progress: Progress) -> dict[str, Outcome]:
+    """Fit all shipped references into `directory`, a folder each; says a line of each, and where the pictures are."""
     check_directory(directory)
     scenes = sorted(references().glob("*.toml"))
-    outcomes: list[tuple[str, Outcome]] = []
+    outcomes: dict[str, Outcome] = {}
     for k, scene in enumerate(scenes):
-        console.print(f"[{k + 1}/{len(scenes)}] {scene.stem}", markup=False)
-        outcome = fit_scene(scene, directory / scene.stem, progress=progress)
-        outcomes.append((scene.stem, outcome))
+        say(f"[{k + 1}/{len(scenes)}] {scene.stem}")
+        outcomes[scene.stem] = outcome = fit_scene(scene, directory / scene.stem, progress=progress)
         for line in _summary(outcome.document):
-            console.print(f"      {line}", markup=False, soft_wrap=True)
-    console.print("\nPictures and reports:", markup=False)
-    for _, outcome in outcomes:
-        console.print(
-            f"  {outcome.directory / 'fit.png'}  (report.html, material.frag, preset.json beside it)",
-            markup=False,
-            soft_wrap=True,
-        )
-    return all(outcome.good for _, outcome in outcomes)
+            say(f"      {line}")
+    say("\nPictures and reports:")
+    for outcome in outcomes.values():
+        say(f"  {outcome.directory / 'fit.png'}  (report.html, material.frag, preset.json beside it)")
+    return outcomes
 
 
 def _summary(document: dict[str, Any]) -> list[str]:

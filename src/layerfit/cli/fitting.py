@@ -1,15 +1,21 @@
 """Commands that fit: `fit`, `structures`, and `advise`, which is asked before a fit."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .app import STARTED, Json, Loss, Metric, Output, Scene, Seed, Starts, app, check_choice, emit, many, progress, say, stderr
+from . import complete
+from .app import Loss, Metric, Output, Scene, Seed, Starts, check_choice, command
+from .talk import STARTED, Done, many, progress, say, show
+
+STARTS_MORE = 32
+"""Starts for a fit that did not converge with those that it had: the default is a quarter of them."""
 
 
-@app.command()
+@command()
 def fit(
     scene: Scene,
     output: Output = Path("out"),
@@ -24,8 +30,7 @@ def fit(
             help="Parameter whose 95 % interval is found by fitting the others again, such as coat.tau; may be repeated.",
         ),
     ] = None,
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Fit a material to a reference render or a measured BRDF.
 
     Leaves `fit.json`, `preset.json`, `material.frag`, `report.html`, `fit.png` and `trace.csv` in the output directory.
@@ -53,32 +58,45 @@ def fit(
             metric=metric,
             loss=loss,
         )
-    _show_fit(outcome, as_json)
-    raise typer.Exit(0 if outcome.good else 1)
+    _show_fit(outcome)
+    return Done(outcome.document, _after_fit(outcome.document["flags"], scene, output), outcome.good)
 
 
-def _show_fit(outcome: Any, as_json: bool) -> None:
+def _show_fit(outcome: Any) -> None:
     from ..report.text import lines
 
     for line in lines(outcome.document):
         say(line)
     say(f"Wrote fit.png, report.html, material.frag, preset.json, fit.json and trace.csv in {outcome.directory}/")
-    if as_json:
-        emit(outcome.document)
 
 
-@app.command()
+def _after_fit(flags: Sequence[str], scene: Path, output: Path) -> tuple[Any, ...]:
+    """What the gravest flag of a fit asks for; without one, a look at the material."""
+    found, preset = {flag.partition(":")[0] for flag in flags}, output / "preset.json"
+    if "shader_differs" in found:
+        return ("doctor",)
+    if "not_converged" in found:
+        return "fit", scene, "--starts", STARTS_MORE, "-o", output
+    if "poor_fit" in found:
+        return "structures", scene, "-o", output / "structures"
+    if found & {"not_identifiable", "undetermined_direction", "correlated", "other_minimum", "lower_limit"}:
+        return "advise", scene, "--preset", preset
+    return "view", preset
+
+
+@command()
 def structures(
     reference: Annotated[Path, typer.Argument(help="Scene file, or a measured BRDF: .brdf, .bsdf, .binary or .csv.")],
     output: Output = Path("out"),
     only: Annotated[str | None, typer.Option(help="Names of structures to try, with commas; left out, all.")] = None,
-    metric: Annotated[str, typer.Option(help="law, uniform, relative, log or cube_root.")] = "log",
+    metric: Annotated[
+        str, typer.Option(help="law, uniform, relative, log or cube_root.", autocompletion=complete.metrics)
+    ] = "log",
     min_half_deg: Annotated[
         float, typer.Option(min=0.0, max=89.0, help="Of a measured BRDF: leave out what is nearer to the mirror direction.")
     ] = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of starts and pixel choices.")] = 0,
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Find out which structure a reference supports: fit candidates, and choose the simplest that explains it.
 
     Leaves `structures.json` and `structures.png` in the output directory, beside what a fit of the chosen one leaves. Exit code 1: it
@@ -99,16 +117,14 @@ def structures(
         outcome = structures_of(
             reference, output, structures=names, metric=metric, seed=seed, min_half_deg=min_half_deg, progress=report
         )
-    stderr.print(table(outcome.document))
+    show(table(outcome.document))
     for sentence in outcome.document["in_words"]:
         say(sentence)
     say(f"Wrote structures.png and structures.json in {output}/, and of the fit fit.png, report.html, preset.json and fit.json")
-    if as_json:
-        emit(outcome.document)
-    raise typer.Exit(0 if outcome.good else 1)
+    return Done(outcome.document, ("view", output / "preset.json"), outcome.good)
 
 
-@app.command()
+@command()
 def batch(
     scenes: Annotated[
         list[str],
@@ -126,8 +142,7 @@ def batch(
     seed: Seed = None,
     metric: Metric = None,
     loss: Loss = None,
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Fit many scenes into one table.
 
     Leaves `results.csv`, `results.parquet` (where pyarrow is installed) and `batch.json`. What is interrupted goes on where it was when the
@@ -161,21 +176,28 @@ def batch(
             say(f"failed: {row['error']}")
     document = done.document
     say(f"{document['done']} done ({document['kept']} of them before), {document['failed']} failed: {document['table']}")
-    if as_json:
-        emit(document)
-    raise typer.Exit(0 if done.good else 1)
+    return Done(document, _after_batch(done.rows, output), done.good)
 
 
-@app.command()
+def _after_batch(rows: Sequence[Any], output: Path) -> tuple[Any, ...]:
+    """A closer look at a scene that failed, else at the one that is fitted worst."""
+    row = next((row for row in rows if row["error"]), None) or max(rows, key=lambda row: row["misfit"])
+    return "fit", row["scene"], "-o", output / Path(row["scene"]).stem
+
+
+@command()
 def advise(
     scene: Scene,
     preset: Annotated[
         Path | None,
-        typer.Option("--preset", help="The material to ask about, such as a fitted one; left out, the scene's start."),
+        typer.Option(
+            "--preset",
+            help="The material to ask about, such as a fitted one; left out, the scene's start.",
+            autocompletion=complete.presets,
+        ),
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for advice.json and advice.png.")] = None,
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Say what the images of a scene determine of its material, and which further light, camera or thickness would help most.
 
     Exit code 1: something that is free is not determined.
@@ -196,6 +218,4 @@ def advise(
         say(line)
     if output is not None:
         say(f"Wrote advice.png and advice.json in {output}/")
-    if as_json:
-        emit(document)
-    raise typer.Exit(0 if all(row["identifiable"] for row in document["parameters"].values()) else 1)
+    return Done(document, ("fit", scene), all(row["identifiable"] for row in document["parameters"].values()))

@@ -6,10 +6,11 @@ from typing import Annotated
 
 import typer
 
-from .app import Json, Output, Preset, Scene, app, emit, progress, say, stderr
+from .app import Output, Preset, Scene, command
+from .talk import Done, progress, say, show
 
 
-@app.command()
+@command()
 def truth(
     preset: Preset,
     output: Output = Path("out"),
@@ -20,8 +21,7 @@ def truth(
         int | None, typer.Option(min=100, max=10_000_000, help="Paths for every pair of directions; left out, for 0.5 % noise.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of the random walk.")] = 0,
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Compare the closed forms with a random walk through the layers: where each can be trusted, for this material.
 
     Leaves `truth.json` and `truth.png` in the output directory. Exit code 1: the preset's own form is more than 10 % off in the median.
@@ -38,15 +38,13 @@ def truth(
     stack = read_preset(preset)
     with progress() as report:
         document = truth_of_preset(stack, preset.stem, output, interface=interface, paths=paths, seed=seed, progress=report)
-    stderr.print(table(document))
+    show(table(document))
     say(document["in_a_sentence"])
     say(f"Wrote truth.png and truth.json in {output}/")
-    if as_json:
-        emit(document)
-    raise typer.Exit(0 if document["trusted"] else 1)
+    return Done(document, ("tradeoff", preset, "-o", output), document["trusted"])
 
 
-@app.command()
+@command()
 def tradeoff(
     preset: Preset,
     scene: Annotated[
@@ -60,8 +58,7 @@ def tradeoff(
         typer.Option(min=100, max=10_000_000, help="Paths of the random walk for every pair; left out, for 0.5 % noise."),
     ] = None,
     fits: Annotated[bool, typer.Option("--fits/--no-fits", help="Whether fits are timed too: minutes.")] = True,
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Measure error against run time: of the shaders that a material can have, against itself and the random walk; and of its fit.
 
     Leaves `tradeoff.json`, `tradeoff.csv`, `tradeoff.png` and `tradeoff.html` in the output directory. Interrupted, it
@@ -78,12 +75,11 @@ def tradeoff(
     with progress() as report:
         document = measure(preset, scene, output, lights=lights, rounds=rounds, paths=paths, fit=fits, progress=report)
     for table in tables(document):
-        stderr.print(table)
+        show(table)
     for sentence in document["in_words"]:
         say(sentence)
     say(f"Wrote tradeoff.html, tradeoff.png, tradeoff.csv and tradeoff.json in {output}/")
-    if as_json:
-        emit(document)
+    return Done(document, ("export", preset, "--max-error", "0.01"))
 
 
 def _part(text: str) -> float:
@@ -94,7 +90,7 @@ def _part(text: str) -> float:
         raise typer.BadParameter(f"{text!r} is not a part, such as 0.5% or 0.005") from None
 
 
-@app.command()
+@command()
 def specialise(
     preset: Preset,
     scene: Scene,
@@ -102,8 +98,7 @@ def specialise(
     tolerance: Annotated[
         float, typer.Option(parser=_part, metavar="PART", help="By how much the error of the image may grow: 0.5% or 0.005.")
     ] = 0.005,
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Leave out what one scene does not need of a material: part by part, the rest fitted again.
 
     Leaves `preset.json`, `material.frag`, `specialise.json` and `specialise.html` in the output directory. Exit code 1: the
@@ -119,16 +114,14 @@ def specialise(
 
     with progress() as report:
         document = reduce(preset, scene, output, tolerance=tolerance, progress=report)
-    stderr.print(table(document))
+    show(table(document))
     for sentence in document["in_words"]:
         say(sentence)
     say(f"Wrote preset.json, material.frag, specialise.html and specialise.json in {output}/")
-    if as_json:
-        emit(document)
-    raise typer.Exit(0 if document["parity"]["passed"] else 1)
+    return Done(document, ("verify", output / "preset.json", scene), document["parity"]["passed"])
 
 
-@app.command()
+@command()
 def stability(
     word: Annotated[
         str, typer.Argument(help="Part of the name of structures: precise, conductor, patina. Left out: all of them.")
@@ -137,8 +130,7 @@ def stability(
     corners: Annotated[int, typer.Option(min=2, max=65536, help="Corners of the ranges of a structure, at most.")] = 128,
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of the corners that are drawn.")] = 0,
     shaders: Annotated[bool, typer.Option(help="Draw the printed shaders too.")] = True,
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Try every structure at the corners of its ranges and at grazing, normal, mirror and retro directions: do the numbers hold?
 
     Values and derivatives in float32 are compared with float64, and with the printed shader. Leaves `stability.json`, `stability.md` and a
@@ -151,8 +143,7 @@ def stability(
 
     with progress() as report:
         document = stability_of(output, word, corners=corners, shaders=shaders, seed=seed, progress=report)
-    stderr.print(table(document))
+    show(table(document))
     say(f"Wrote stability.json, stability.md and heat/ in {output}/")
-    if as_json:
-        emit(document)
-    raise typer.Exit(0 if document["good"] else 1)
+    words = (word,) if word else ()
+    return Done(document, ("stability", *words, "--corners", 8 * corners, "-o", output), document["good"])

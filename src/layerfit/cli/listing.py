@@ -1,36 +1,33 @@
-"""Commands that look things up: `presets`, `metal` and `inspect`; and `demo`, which shows what the program does."""
+"""Commands that look things up: `presets`, `gallery`, `metal` and `inspect`; `demo`, which shows what the program does, and `doctor`."""
 
 import itertools
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
-from .app import Json, Output, app, emit, progress, say, stderr
+from .app import Output, command
+from .talk import Done, manner, progress, say, stdout, tell
 
 
-@app.command()
+@command()
 def presets(
     word: Annotated[
         str,
         typer.Argument(help="Part of a name, group, structure or description: copper, wood, flakes. Left out: all of them."),
     ] = "",
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """List the presets that ship: found by name wherever a preset is asked for.
 
     Example: `layerfit presets copper`
     """
     found = _found(word)
-    if as_json:
-        emit([{**vars(preset), "path": str(preset.path)} for preset in found])
-        return
     width = max(len(preset.name) for preset in found)
     for group, members in itertools.groupby(found, lambda preset: preset.group):
-        typer.echo(group)
+        tell(f"{group}\n")
         for preset in members:
-            typer.echo(f"  {preset.name:<{width}}  {preset.description}")
+            tell(f"  {preset.name:<{width}}  {preset.description}\n")
+    return Done([{**vars(preset), "path": str(preset.path)} for preset in found], ("view", found[0].name))
 
 
 def _found(word: str) -> list[Any]:
@@ -42,11 +39,11 @@ def _found(word: str) -> list[Any]:
     raise InputError(f"no shipped preset has {word!r} in its name or description; `layerfit presets` lists all of them")
 
 
-@app.command()
+@command()
 def gallery(
     word: Annotated[str, typer.Argument(help="Part of a name, group, structure or description. Left out: all of them.")] = "",
     output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the page.")] = Path("out/gallery"),
-) -> None:
+) -> Done:
     """Show the presets that ship as a page of live previews, drawn by their shaders.
 
     Leaves `index.html` in the output directory: one file that makes no request.
@@ -59,18 +56,17 @@ def gallery(
     found = _found(word)
     check_directory(output)
     write_text(output / "index.html", page(found))
-    say(
-        f"Wrote {output / 'index.html'}: {len(found)} materials; open it in a browser, and one of them with `layerfit view {found[0].name}`"
-    )
+    say(f"Wrote {output / 'index.html'}: {len(found)} materials; open it in a browser")
+    names = [preset.name for preset in found]
+    return Done({"written": str(output / "index.html"), "presets": names}, ("view", names[0]))
 
 
-@app.command()
+@command()
 def metal(
     name: Annotated[
         str | None, typer.Argument(help="Name, symbol or page: copper, Cu, Cu/McPeak. Left out: a list of names.")
     ] = None,
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Print `eta` and `k` of a metal in three channels, from its measured optical constants, for a preset or a scene.
 
     Example: `layerfit metal copper`
@@ -80,27 +76,22 @@ def metal(
 
     if name is None:
         names = metal_names()
-        if as_json:
-            emit(names)
-        else:
-            typer.echo("".join(f"{word:<12} {page}\n" for word, page in names.items()), nl=False)
-        return
+        tell("".join(f"{word:<12} {page}\n" for word, page in names.items()))
+        return Done(names, ("metal", "copper"))
     found = find_metal(name)
     document = {key: rounded(getattr(found, key)) for key in ("eta", "k", "f0")}
-    if as_json:
-        emit({"name": name, **document, "source": found.source, "max_error": found.max_error, "delta_e": found.delta_e})
-        return
-    typer.echo("".join(f"{key} = {document[key]}\n" for key in ("eta", "k")), nl=False)
+    tell("".join(f"{key} = {document[key]}\n" for key in ("eta", "k")))
     say(f"reflectance at normal incidence {document['f0']}, linear Rec.709 of the spectrum under D65")
     say(f"three channels instead of the spectrum: off by at most {found.max_error:.2g}, delta E 2000 {found.delta_e:.2g}")
     say(f"from {found.source}")
+    document |= {"source": found.source, "max_error": found.max_error, "delta_e": found.delta_e}
+    return Done({"name": name, **document}, ("fit", "scene.toml"))
 
 
-@app.command()
+@command()
 def inspect(
     file: Annotated[Path, typer.Argument(help="EXR file, or a measured BRDF: .brdf, .bsdf, .binary or .csv.")],
-    as_json: Json = False,
-) -> None:
+) -> Done:
     """Say what a file holds, what a fit would use of it and why, and what looks wrong: of an EXR, or of a measured BRDF.
 
     Example: `layerfit inspect render.exr`
@@ -108,17 +99,17 @@ def inspect(
     from ..capture.inspect import inspect as inspect_file
 
     found = inspect_file(file)
-    if as_json:
-        emit(found.to_json())
-    else:
-        Console(highlight=False).print(found.render())
-    raise typer.Exit(1 if any(finding.severity == "warning" for finding in found.findings) else 0)
+    if not manner.json:
+        stdout.print(found.render())
+    measured = file.suffix.lower() != ".exr"
+    good = not any(finding.severity == "warning" for finding in found.findings)
+    return Done(found.to_json(), ("structures", file) if measured else ("fit", file.with_suffix(".toml")), good)
 
 
-@app.command()
+@command()
 def demo(
     output: Output = Path("out/demo"),
-) -> None:
+) -> Done:
     """Fit the references that layerfit ships, verify their shaders, and say where the pictures are.
 
     Example: `layerfit demo -o out/demo`
@@ -129,5 +120,23 @@ def demo(
     from ..demo import run
 
     with progress() as report:
-        good = run(output, stderr, report)
-    raise typer.Exit(0 if good else 1)
+        outcomes = run(output, say, report)
+    documents = {name: outcome.document for name, outcome in outcomes.items()}
+    first = next(iter(outcomes.values())).directory
+    return Done(documents, ("view", first / "preset.json"), all(outcome.good for outcome in outcomes.values()))
+
+
+@command()
+def doctor() -> Done:
+    """Say what is installed and what this machine can do, what each missing thing would give, and the command that gets it.
+
+    Exit code 0: the main job can be done: fit, print, verify. 1: something that it needs is missing.
+
+    Example: `layerfit doctor`
+    """
+    from ..doctor import examine
+
+    found = examine()
+    for line in found.lines():
+        tell(f"{line}\n")
+    return Done(found.to_json(), ("demo",) if found.good else ("doctor",), found.good)

@@ -1,22 +1,26 @@
 """Commands about the shader of a material: `export` and `verify`."""
 
-import sys
 from pathlib import Path
 from typing import Annotated, Any, cast
 
 import typer
 
-from .app import Json, Preset, app, emit, say
+from . import complete
+from .app import Preset, command
+from .talk import Done, finish, say, tell
 
 
-@app.command()
+@command()
 def export(
     preset: Preset,
-    target: Annotated[str, typer.Option(help="glsl330 or essl300.")] = "glsl330",
+    target: Annotated[str, typer.Option(help="glsl330 or essl300.", autocompletion=complete.targets)] = "glsl330",
     uniforms: Annotated[
         bool, typer.Option("--uniforms", help="Parameters as uniforms, for live tuning, not as constants.")
     ] = False,
-    tier: Annotated[str | None, typer.Option(help="exact (the default), compact, lazanyi, schlick or faithful.")] = None,
+    tier: Annotated[
+        str | None,
+        typer.Option(help="exact (the default), compact, lazanyi, schlick or faithful.", autocompletion=complete.tiers),
+    ] = None,
     max_error: Annotated[
         float | None, typer.Option(help="Relative error against the exact form that is allowed: takes the cheapest tier.")
     ] = None,
@@ -24,7 +28,7 @@ def export(
         float | None, typer.Option(help="Instructions in times of Phong: takes the nearest tier within.")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Shader to write; left out, standard output.")] = None,
-) -> None:
+) -> Done:
     """Print the shader of a preset.
 
     Example: `layerfit export out/preset.json --target essl300 -o copper.frag`
@@ -41,20 +45,22 @@ def export(
     if uniforms and asked:
         raise InputError("--uniforms goes with the exact form alone: leave out --tier, --max-error and --max-cost")
     if asked:
-        shader, told = _tier(stack, preset.stem, tier, max_error, max_cost)
+        shader, name, told = _tier(stack, preset.stem, tier, max_error, max_cost)
         say(told)
     else:
-        shader = print_material(stack, preset.stem, uniforms)
+        shader, name = print_material(stack, preset.stem, uniforms), "exact"
     text = shader.text(target)
     if output is None:
-        sys.stdout.write(text)
+        tell(text)
     else:
         write_text(output, text)
         say(f"Wrote {output}")
+    document = {"name": shader.name, "target": target, "tier": name, "shader": text}
+    return Done(document, ("verify", preset))
 
 
 def _tier(stack: Any, name: str, tier: str | None, max_error: float | None, max_cost: float | None) -> Any:
-    """The shader of the tier that is asked for, and what is said of it."""
+    """The shader of the tier that is asked for, its name, and what is said of it."""
     from ..errors import InputError
     from ..shader.choose import choose_tier
     from ..shader.export import print_material
@@ -62,22 +68,21 @@ def _tier(stack: Any, name: str, tier: str | None, max_error: float | None, max_
 
     if tier is None:
         choice = choose_tier(stack, name, max_error, max_cost)
-        return choice.shader, str(choice)
+        return choice.shader, choice.tier.name, str(choice)
     if max_cost is not None:
         raise InputError("--max-cost chooses a tier: leave out --tier")
     made = make_tier(stack, cast(Any, tier), max_error)
-    return print_material(made.stack, name), f"{made.name}: within {made.error:.1e} of the exact form"
+    return print_material(made.stack, name), made.name, f"{made.name}: within {made.error:.1e} of the exact form"
 
 
-@app.command()
+@command()
 def verify(
     preset: Preset,
     scene: Annotated[Path | None, typer.Argument(help="Scene file: also compare pixels with its references.")] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the picture strip.")] = None,
-    as_json: Json = False,
     fail: Annotated[float | None, typer.Option(help="Relative difference from JAX that p99.9 of the values may have.")] = None,
     hardfail: Annotated[float | None, typer.Option(help="Relative difference from JAX that any value may have.")] = None,
-) -> None:
+) -> Done:
     """Render the printed shader of a preset in OpenGL and compare it with JAX, number by number, and with references.
 
     Example: `layerfit verify out/preset.json scene.toml -o out`
@@ -100,17 +105,16 @@ def verify(
     if picture:
         say(f"Wrote {picture}")
     say(verdict(document))
-    if as_json:
-        emit(document)
-    raise typer.Exit(0 if document["passed"] else 1)
+    then = ("export", preset, "-o", f"{preset.stem}.frag") if document["passed"] else ("doctor",)
+    return Done(document, then, document["passed"])
 
 
-@app.command()
+@command()
 def view(
     preset: Preset,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the page to this HTML file instead.")] = None,
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
-) -> None:
+) -> Done:
     """Look at a preset live and tune it: its exported shader in the browser, with a slider for every parameter.
 
     The page is served to this machine alone, until Ctrl+C; with `-o` it is a file to keep or to send. It can save the tuned preset.
@@ -124,9 +128,14 @@ def view(
     from ..preset import read_preset
     from ..view import page, serve
 
+    def ready(address: str) -> None:
+        say(f"{preset.stem} is at {address} (Ctrl+C ends)")
+        finish(Done({"address": address}, ("export", f"{preset.stem}.json")))
+
     text = page(read_preset(preset), preset.stem)
-    if output is not None:
-        write_text(output, text)
-        say(f"Wrote {output}; open it in a browser")
-        return
-    serve(text, lambda address: say(f"{preset.stem} is at {address} (Ctrl+C ends)"), open_browser)
+    if output is None:
+        serve(text, ready, open_browser)
+        return Done()
+    write_text(output, text)
+    say(f"Wrote {output}; open it in a browser")
+    return Done({"written": str(output)}, ("export", preset))
