@@ -99,7 +99,7 @@ SILENT = {"--help", "--version", "-q", "--quiet"}
 
 def check_next(arguments: tuple[Any, ...], ran: Ran) -> None:
     """A command that has done its work names the next one in its last line, and that is a command."""
-    if ran.code == 2 or SILENT.intersection(arguments):
+    if ran.code not in (0, 1) or SILENT.intersection(arguments):
         return
     last = ran.err.rstrip().splitlines()[-1]
     assert last.startswith("Next: layerfit "), last

@@ -83,6 +83,14 @@ def test_a_package_that_is_missing_is_told(monkeypatch):
     assert missing.fix.startswith("pip install 'optimistix")
 
 
+def test_a_source_that_is_not_installed_is_no_fault(monkeypatch):
+    def nothing(name):
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor.metadata, "requires", nothing)
+    assert [(finding.name, finding.needed) for finding in doctor._packages()] == [("layerfit", False)]
+
+
 def test_the_cache_is_found_and_its_size(tmp_path, monkeypatch):
     monkeypatch.delenv("LAYERFIT_NO_CACHE", raising=False)
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path / "cache"))

@@ -27,6 +27,7 @@ from .layers import (
     Patina as Patina,
     Polish as Polish,
 )
+from .notebook import live as live
 from .optics.lazanyi import Lazanyi as Lazanyi, fit_lazanyi as fit_lazanyi
 from .optics.metals import Metal as Metal, metal as metal
 from .optics.spectra import Absorption as Absorption, absorption_rgb as absorption_rgb

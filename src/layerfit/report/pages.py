@@ -13,7 +13,8 @@ from string import Template
 from typing import Any
 
 FOLDER = Path(__file__).parent / "page"
-SCRIPTS = ("program.js", "shapes.js", "renderer.js", "view.js", "controls.js", "compare.js", "gallery.js", "page.js")
+VIEWER = ("packed.js", "program.js", "shapes.js", "renderer.js", "view.js", "controls.js")
+SCRIPTS = (*VIEWER, "compare.js", "gallery.js", "page.js")
 
 
 def text(name: str) -> str:
@@ -28,11 +29,16 @@ def filled(name: str, /, **slots: str) -> str:
 
 def page(title: str, body: str, data: Mapping[str, bytes] | None = None) -> str:
     """A whole page; `data` are read by its scripts, by their names. Without data there are no scripts."""
-    packed = (
-        f'<script type="text/plain" id="{escape(name)}">{_packed(content)}</script>' for name, content in (data or {}).items()
+    held = (
+        f'<script type="text/plain" id="{escape(key)}">{_as_text(content)}</script>' for key, content in (data or {}).items()
     )
     script = "\n".join(map(text, SCRIPTS)) if data else ""
-    return filled("frame.html", title=escape(title), style=text("page.css"), body=body, data="\n".join(packed), script=script)
+    return filled("frame.html", title=escape(title), style=text("page.css"), body=body, data="\n".join(held), script=script)
+
+
+def module(name: str) -> str:
+    """The scripts of a viewer and a last one as an ES module; `STYLE` is theirs."""
+    return "\n".join([f"const STYLE = {json.dumps(text('page.css'))};", *map(text, (*VIEWER, name))])
 
 
 def as_json(document: Any) -> bytes:
@@ -40,5 +46,10 @@ def as_json(document: Any) -> bytes:
     return json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
 
 
-def _packed(content: bytes) -> str:
-    return base64.b64encode(zlib.compress(content, 9)).decode()
+def packed(content: bytes) -> bytes:
+    """Data as `packed.js` reads them."""
+    return zlib.compress(content, 9)
+
+
+def _as_text(content: bytes) -> str:
+    return base64.b64encode(packed(content)).decode()

@@ -60,7 +60,7 @@ function turning(view, sun) {
     view.change();
   };
   view.canvas.addEventListener("wheel", (event) => {
-    if (!event.ctrlKey && document.activeElement !== view.canvas) return;  // else the page scrolls
+    if (!event.ctrlKey && !view.canvas.matches(":focus")) return;  // else the page scrolls
     event.preventDefault();
     nearer(Math.exp(event.deltaY / 1000));
   }, { passive: false });
@@ -152,6 +152,10 @@ function viewer(place, renderer, data) {
     run(now).forEach((value, k) => { view.values[k][1] = value; });
     view.change();
   };
+  const tuned = () => {
+    recompute();
+    view.ontuned();
+  };
   const shows = [];
   const groups = new Map();
   data.parameters.forEach((row, k) => {
@@ -159,7 +163,7 @@ function viewer(place, renderer, data) {
     if (!groups.has(layer)) groups.set(layer, element("fieldset", {}, element("legend", { textContent: layer })));
     const unitText = row.unit === "1" ? "" : ` [${row.unit}]`;
     const label = element("span", { className: "name", textContent: `${field}${unitText}`, title: `${row.doc}; ${digits(row.lower)} to ${digits(row.upper)}` });
-    const sliders = row.value.map((_, channel) => slider(row, channel, now[k], recompute));
+    const sliders = row.value.map((_, channel) => slider(row, channel, now[k], tuned));
     shows.push(...sliders.map(({ show }) => show));
     groups.get(layer).append(element("div", { className: "parameter" }, label, element("div", {}, ...sliders.map(({ made }) => made))));
   });
@@ -170,6 +174,7 @@ function viewer(place, renderer, data) {
     shows.forEach((show) => show());
     data.values.forEach(([, value], k) => { view.values[k][1] = value; });
     view.change();
+    view.ontuned();
   });
   const save = element("button", { type: "button", textContent: "Save as preset" });
   save.addEventListener("click", () => download(`${data.name}.json`, view.saved()));
@@ -185,7 +190,20 @@ function viewer(place, renderer, data) {
     element("div", { className: "stage" }, canvas, sun),
     element("div", { className: "controls" }, look, element("div", { className: "buttons" }, back, save), ...groups.values()),
   );
-  return Object.assign(view, { constants: () => run(now), saved: () => preset(data, now) });
+  // Numbers of the sliders by the names of their parameters, and back; `ontuned` is called where a user has moved one.
+  const numbers = () => Object.fromEntries(data.parameters.map(({ name }, k) => [name, now[k].length > 1 ? Array.from(now[k]) : now[k][0]]));
+  const assign = (numbers) => {
+    const moved = data.parameters.filter(({ name }, k) => {
+      const value = [numbers[name]].flat();
+      const differs = value.some((x, channel) => x !== now[k][channel]);
+      if (differs) now[k].set(value);
+      return differs;
+    });
+    if (!moved.length) return;
+    shows.forEach((show) => show());
+    recompute();
+  };
+  return Object.assign(view, { constants: () => run(now), saved: () => preset(data, now), numbers, assign, ontuned: () => {} });
 }
 
 // The preset's document with the numbers of the sliders; what a fit said of the old ones is left out.

@@ -1,12 +1,7 @@
 // What a page holds: compressed data beside the text, unpacked here; then its viewers and comparisons.
 
-async function unpacked(name) {
-  const packed = Uint8Array.from(atob(document.getElementById(name).textContent), (c) => c.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
-const readDocument = async (name) => JSON.parse(new TextDecoder().decode(await unpacked(name)));
+const unpacked = (name) => inflated(Uint8Array.from(atob(document.getElementById(name).textContent), (c) => c.charCodeAt(0)));
+const readDocument = async (name) => parsed(await unpacked(name));
 
 async function start() {
   const page = { views: [], ready: false };

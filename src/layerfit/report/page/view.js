@@ -55,6 +55,13 @@ class View {
     this.pass = null;
   }
 
+  // Gives back all that it holds of the renderer.
+  dispose() {
+    this.release();
+    if (this.material) this.renderer.gl.deleteProgram(this.material.program);
+    this.material = null;
+  }
+
   // Lights of one pass: a point of the key light and of each soft box, by a sequence that fills a square evenly (Roberts 2018).
   lights(k) {
     const at = (n) => [(0.5 + 0.7548776662 * (k + 0.37 * n)) % 1, (0.5 + 0.5698402910 * (k + 0.61 * n)) % 1].map((x) => 2 * x - 1);
@@ -109,7 +116,7 @@ class View {
   }
 }
 
-// Draws those views of a page that are in sight and not yet still; more passes a frame where the machine keeps up.
+// Draws those views of a page that are in sight and not yet still; more passes a frame where the machine keeps up. Returns what ends it.
 function run(views) {
   const seen = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) {
@@ -119,8 +126,10 @@ function run(views) {
     }
   }, { rootMargin: "100px" });
   views.forEach(({ canvas }) => seen.observe(canvas));
-  window.addEventListener("resize", () => views.forEach((view) => view.change()));
+  const anew = () => views.forEach((view) => view.change());
+  window.addEventListener("resize", anew);
   let before = 0;
+  let next = 0;
   const frame = (now) => {
     const waited = now - before;
     before = now;
@@ -132,7 +141,13 @@ function run(views) {
       if (waited > 250 && view.passes > 0 && view.passes < 3) view.fineness = Math.max(view.fineness / 2, 0.25);  // no GPU
       view.frame();
     }
-    requestAnimationFrame(frame);
+    next = requestAnimationFrame(frame);
   };
-  requestAnimationFrame(frame);
+  next = requestAnimationFrame(frame);
+  return () => {
+    cancelAnimationFrame(next);
+    seen.disconnect();
+    window.removeEventListener("resize", anew);
+    views.forEach((view) => view.dispose());
+  };
 }
