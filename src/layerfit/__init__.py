@@ -16,7 +16,7 @@
 - Rendering: predict gives pixels, radiance the same traced, brdf the plain function; Place is where on the surface.
 - Shaders: print_material gives a Shader; shade_samples draws it; check_pairs and check_image compare it with JAX and give a Parity.
 - Error against run time: tradeoff does what `layerfit tradeoff` does, specialise leaves out what a scene does not need.
-- Notebooks: live shows a material with sliders, both ways.
+- Notebooks: live shows a material with sliders, both ways. plot_plane, plot_convergence and plot_tradeoff draw into axes of matplotlib.
 - Tiers: make_tier gives another way to print a material, a Tier; choose_tier the cheapest that is near enough, a Choice.
 - The machine: use_compilation_cache. Faults: InputError and MachineError, each a LayerfitError.
 

@@ -31,6 +31,7 @@ from .notebook import live as live
 from .optics.lazanyi import Lazanyi as Lazanyi, fit_lazanyi as fit_lazanyi
 from .optics.metals import Metal as Metal, metal as metal
 from .optics.spectra import Absorption as Absorption, absorption_rgb as absorption_rgb
+from .plot import plot_convergence as plot_convergence, plot_plane as plot_plane, plot_tradeoff as plot_tradeoff
 from .preset import read_preset as read_preset, write_preset as write_preset
 from .render import brdf as brdf, predict as predict, radiance as radiance
 from .shader.choose import Choice as Choice, choose_tier as choose_tier

@@ -1,7 +1,9 @@
 """The presets that ship: where they are, and what each says of itself. Their numbers are read by `preset`."""
 
+import base64
 import dataclasses
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +31,12 @@ class Shipped:
     """Its layers, outermost first, and the form that it is evaluated in."""
     path: Path
     """The JSON document. Beside it lie the printed shader, `.frag`, and its picture, `.png`."""
+
+    def _repr_html_(self) -> str:
+        """For notebooks: its picture, and what it says of itself."""
+        picture = base64.b64encode(self.path.with_suffix(".png").read_bytes()).decode()
+        words = "<br>".join(escape(line) for line in (self.description, self.structure, self.source))
+        return f'<p><b>{escape(self.name)}</b><br><img alt="" src="data:image/png;base64,{picture}"><br>{words}</p>'
 
 
 def shipped_presets(word: str = "") -> list[Shipped]:

@@ -17,6 +17,7 @@ from .fit.fit import fit
 from .fit.parameters import known_parameters, with_fixed
 from .preset import left_out, preset_of, read_preset
 from .report import specialise as report
+from .report.told import Told
 from .shader.cost import instructions, times, tools
 from .shader.export import print_material
 from .shader.gl import renderer
@@ -106,7 +107,7 @@ def specialise(
     write_text(directory / "specialise.html", report.page(document))
     write_text(directory / "specialise.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
     kept.done()
-    return document
+    return Told(document, report.table(document), *document["in_words"])
 
 
 def _reduced(

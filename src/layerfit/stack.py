@@ -6,9 +6,12 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from ._chunk import static, struct, where
 from ._compiled import Compiled
+from ._fields import Param, params
+from ._html import table
 from ._place import Place, needs, reads
 from ._types import Colour, Vec3
 from .forms import corrected, faithful, patina, precise, weathering
@@ -31,6 +34,17 @@ class Stack:
     def astype(self, dtype: Any) -> "Stack":
         """The same material with every number in one precision."""
         return jax.tree.map(lambda x: jnp.asarray(x, dtype), self)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: every number of its layers, the outermost first."""
+        rows = [
+            [f"{layer.name}.{field}", _shown(value), "" if spec.unit == "1" else spec.unit, _range(spec), spec.doc]
+            for layer in (*self.layers, self.base)
+            for field, spec in params(layer)
+            if (value := getattr(layer, field)) is not None
+        ]
+        kinds = " over ".join(type(layer).__name__ for layer in (*self.layers, self.base))
+        return f"<p>{kinds}, {type(self.form).__name__.lower()} form</p>{table(_SHOWN, rows)}"
 
     def prepare(self) -> Any:
         """What is computed once per material: the constants of its shader. Raises ValueError for a material that is not of its form."""
@@ -66,6 +80,17 @@ class Stack:
             raise KeyError(f"no layer called {name!r} to take off; there are {[layer.name for layer in self.layers]}")
         # A bare base is the same in every form; the corrected one is for all materials, in a preset too.
         return replace(self, layers=left, form=self.form if left else corrected.Corrected())
+
+
+_SHOWN = ("parameter", "value", "unit", "range", "meaning")
+
+
+def _shown(value: Any) -> str:
+    return ", ".join(f"{v:.4g}" for v in np.ravel(np.asarray(value, float)))
+
+
+def _range(spec: Param) -> str:
+    return f"{spec.lower:g} to {spec.upper:g}"
 
 
 prepared = Compiled(Stack.prepare, optimise=0)

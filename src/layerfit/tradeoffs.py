@@ -19,6 +19,7 @@ from .errors import InputError
 from .fit.words import structure
 from .preset import model_name, preset_of, read_preset
 from .report import tradeoff as report
+from .report.told import Told
 from .shader.cost import ROUNDS, times, tools
 from .shader.gl import renderer
 from .stack import Stack
@@ -86,7 +87,7 @@ def tradeoff(
     write_text(directory / "tradeoff.html", report.page(document, picture))
     write_text(directory / "tradeoff.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
     kept.done()
-    return document
+    return Told(document, *report.tables(document), *document["in_words"])
 
 
 def _shaders(

@@ -19,6 +19,7 @@ from .fit.words import structure
 from .preset import MODELS, model_name
 from .render import brdf
 from .report import truth as report
+from .report.told import Told
 from .stack import FORMS, Stack
 from .walk import Estimate, hazes, interface_of, refuses, top_lobe, walk
 
@@ -128,12 +129,12 @@ def write_truth(document: dict[str, Any], directory: Path) -> None:
     write_text(directory / "truth.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
 
 
-def truth_of_preset(stack: Stack, name: str, directory: Path, **options: Any) -> dict[str, Any]:
+def truth_of_preset(stack: Stack, name: str, directory: Path, **options: Any) -> Told:
     """Compare, and write the results; a directory that cannot be written to is told before the work."""
     check_directory(directory)
     document = compare(stack, name, **options)
     write_truth(document, directory)
-    return document
+    return Told(document, report.table(document), document["in_a_sentence"])
 
 
 def check(stack: Stack, name: str, interface: str) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..documents import check_directory, write_text
+from ..fit import words
 from .rows import Row
 from .sharing import fitted
 from .table import JOURNAL, journal, write_line, write_table
@@ -29,6 +30,10 @@ class Batch:
     rows: list[Row]
     good: bool
     """Nothing failed."""
+
+    def _repr_html_(self) -> str:
+        """For notebooks: a line for each scene, with its values and sigmas."""
+        return f"<p>{self.document['done']} done, {self.document['failed']} failed</p>{words.rows(self.rows)}"
 
 
 def fit_batch(

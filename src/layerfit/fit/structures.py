@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from .._html import table
 from ..capture.load import AnyView
 from ..capture.measured.view import MeasuredView
 from ..capture.samples import Samples
@@ -77,6 +78,21 @@ class StructureChoice:
     """BIC of the best structure without a coat less that of the best one with a coat; NaN where one of the two was not tried."""
     retro: float | None
     """Light that comes back towards the light, over that of the chosen fit, where it is far more; else None."""
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the structures, lowest criterion first, and which was chosen."""
+        rows = [
+            [
+                t.candidate.words,
+                str(t.layers),
+                str(t.parameters),
+                f"{t.error:.4g}",
+                f"{t.bic:.1f}",
+                "chosen" if t is self.chosen else "",
+            ]
+            for t in sorted(self.tried, key=lambda t: t.bic)
+        ]
+        return table(("structure", "coats", "parameters", "error", "BIC", ""), rows)
 
     @property
     def best(self) -> Tried:

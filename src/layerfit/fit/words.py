@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .._html import table as html_table
 from ..stack import Stack
 
 SIGMA = (
@@ -66,6 +67,19 @@ def blocks(remarks: Mapping[str, Sequence[str]]) -> str:
         f"<p><b>{html.escape(heading)}</b><br>{'<br>'.join(html.escape(line) for line in lines)}</p>"
         for heading, lines in remarks.items()
     )
+
+
+def rows(found: Sequence[Mapping[str, Any]]) -> str:
+    """Rows of a batch as an HTML table: what has a sigma beside it, with it; and the message of what failed."""
+    columns = list(dict.fromkeys(name for row in found for name in row if not name.endswith((".sigma", ".corrected"))))
+    return html_table(columns, [[_cell(row, name) for name in columns] for row in found])
+
+
+def _cell(row: Mapping[str, Any], name: str) -> str:
+    value = row.get(name)
+    if isinstance(value, float):
+        return " \u00b1 ".join(measured(value, row[f"{name}.sigma"])) if f"{name}.sigma" in row else number(value)
+    return "" if value is None else str(value)
 
 
 def _row(name: str, row: Mapping[str, Any]) -> str:

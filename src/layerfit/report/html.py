@@ -58,12 +58,6 @@ def figure(picture: bytes, alt: str, caption: str) -> str:
 _PLANES = "In the plane of incidence; the mirror side is positive."
 
 
-def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table of plain words."""
-    line = lambda cells, kind: "<tr>" + "".join(f"<{kind}>{escape(cell)}</{kind}>" for cell in cells) + "</tr>"  # noqa: E731
-    return f"<table>{line(headings, 'th')}{''.join(line(row, 'td') for row in rows)}</table>"
-
-
 def _verdict(document: Mapping[str, Any]) -> str:
     """The result in a sentence."""
     parity = document["parity"]

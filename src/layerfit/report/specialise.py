@@ -4,8 +4,8 @@ import html
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from .._html import table as html_table
 from . import pages
-from .html import table as html_table
 from .truth import percent
 
 if TYPE_CHECKING:

@@ -4,8 +4,9 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from .._html import table
 from . import pages
-from .html import figure, table
+from .html import figure
 from .scatter import Panel, Point, scatter
 from .truth import percent
 

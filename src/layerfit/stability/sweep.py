@@ -10,6 +10,7 @@ import numpy as np
 from ..documents import check_directory, finite, write_bytes, write_text
 from ..errors import InputError
 from ..report import stability as report
+from ..report.told import Told
 from ..stack import Stack
 from . import limits, shader
 from .grid import POLAR_DEG, Grid, directions, grid
@@ -131,9 +132,9 @@ def write_stability(document: Mapping[str, Any], directory: Path) -> None:
     write_text(directory / "stability.json", json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
-def stability_of(directory: Path, word: str = "", **options: Any) -> dict[str, Any]:
+def stability_of(directory: Path, word: str = "", **options: Any) -> Told:
     """Sweep, and write the results; a directory that cannot be written to is told before the work."""
     check_directory(directory)
     document = sweep(word, **options)
     write_stability(document, directory)
-    return document
+    return Told(document, report.table(document))

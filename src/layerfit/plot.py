@@ -1,0 +1,91 @@
+"""Figures for notebooks. Each draws into the axes that it is given, or into new ones, and returns them. The only file with matplotlib."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import InputError, MachineError
+from .fit.result import FitResult
+from .render import brdf_values
+from .report.tradeoff import error_of, front
+from .stack import Stack
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes  # pyright: ignore[reportMissingImports]  # an extra
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Of linear Rec.709."""
+
+
+def plot_plane(materials: Stack | Mapping[str, Stack], theta_deg: float = 45.0, *, ax: "Axes | None" = None) -> "Axes":
+    """BRDF times the cosine to the light [1/sr], its luminance, in the plane of incidence; one line for each of the named materials.
+
+    Light comes from `theta_deg` degrees, 0 to 89; the viewer goes from -85 to 85 degrees, the mirror side positive. Raises `InputError` for
+    another angle, and `MachineError` without the extra `plot`.
+    """
+    if not 0.0 <= theta_deg < 90.0:
+        raise InputError(f"theta_deg = {theta_deg}: should be an angle from 0 to 89 degrees, from the normal")
+    ax = _axes(ax)
+    angle = np.linspace(-85.0, 85.0, 341)
+    wi = np.broadcast_to(_direction(np.array(-theta_deg)), (len(angle), 3))
+    named = {"": materials} if isinstance(materials, Stack) else materials
+    for name, stack in named.items():
+        values = brdf_values(stack, wi.astype(np.float32), _direction(angle).astype(np.float32)) @ LUMINANCE
+        ax.plot(angle, values * np.cos(np.radians(theta_deg)), label=name or None)
+    ax.set(xlabel="angle of the viewer [degrees]", ylabel="BRDF x cosine [1/sr]", yscale="log")
+    ax.set_title(f"in the plane of incidence, light from {theta_deg:g} degrees")
+    if any(named):
+        ax.legend()
+    return ax
+
+
+def _direction(degrees: np.ndarray) -> np.ndarray:
+    """Unit directions (..., 3) in the plane of incidence."""
+    t = np.radians(degrees)
+    return np.stack([np.sin(t), np.zeros_like(t), np.cos(t)], -1)
+
+
+def plot_convergence(result: FitResult, *, ax: "Axes | None" = None) -> "Axes":
+    """Error of a fit against its run time [s], a line for each start in each stage. Raises `MachineError` without the extra `plot`."""
+    ax = _axes(ax)
+    lines: dict[tuple[str, int], list[Any]] = {}
+    for row in result.trace:
+        lines.setdefault((row.stage.split()[0], row.start), []).append(row)
+    stages = list(dict.fromkeys(stage for stage, _ in lines))
+    for (stage, start), rows in lines.items():
+        first = start == min(s for other, s in lines if other == stage)
+        style = {"color": f"C{stages.index(stage)}", "marker": ".", "linewidth": 1.0, "label": stage if first else None}
+        ax.plot([row.time_s for row in rows], [row.error for row in rows], **style)
+    ax.set(xlabel="seconds since the fit began", ylabel="error of the pixels in use, relative", yscale="log")
+    ax.legend()
+    return ax
+
+
+def plot_tradeoff(document: Mapping[str, Any], against: str = "exact", *, ax: "Axes | None" = None) -> "Axes":
+    """Error against run time of the shaders of a material, as `tradeoff` gives them: named points, and the Pareto front as a line.
+
+    Errors are the 99.9th percentile `against` the "exact" form, or the median against the random "walk". Raises `InputError` for
+    another word, and `MachineError` without the extra `plot`.
+    """
+    if against not in ("exact", "walk"):
+        raise InputError(f"against = {against!r}: should be 'exact' or 'walk'")
+    ax = _axes(ax)
+    points = {row["tier"]: (row["x_phong"], error) for row in document["tiers"] if (error := error_of(row, against))}
+    for name, (x, y) in points.items():
+        ax.plot(x, y, "o", color="C0")
+        ax.annotate(name, (x, y), xytext=(4, 4), textcoords="offset points")
+    best = sorted(points[name] for name in front(document["tiers"], against) if name in points)
+    ax.plot(*zip(*best, strict=True), color="C1", linewidth=1.0)
+    ax.set(xlabel="time, in times of Phong", ylabel=f"relative error against the {against}", xscale="log", yscale="log")
+    return ax
+
+
+def _axes(ax: "Axes | None") -> "Axes":
+    if ax is not None:
+        return ax
+    try:
+        from matplotlib import pyplot  # pyright: ignore[reportMissingImports]
+    except ModuleNotFoundError:
+        raise MachineError("figures need the package matplotlib: pip install 'layerfit[plot]'") from None
+    return pyplot.subplots(figsize=(6.0, 4.0), layout="constrained")[1]
