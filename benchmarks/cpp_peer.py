@@ -11,6 +11,7 @@ vectorise; "by hand" is the most that C++ can do here: AVX-512 vectors of 16 pix
 
 import argparse
 import ctypes
+import operator
 import os
 import re
 import subprocess
@@ -24,12 +25,15 @@ from typing import Any
 os.environ["OMP_WAIT_POLICY"] = "passive"  # threads that wait for work must not take time from the other side
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import lax
 from rich.console import Console
 from rich.table import Table
 
+from layerfit._compiled import Compiled
 from layerfit.fit import residuals
-from layerfit.fit.blocks import Block
+from layerfit.fit.blocks import Blocks
 from layerfit.fit.parameters import parametrise
 from layerfit.fit.solve import products
 from layerfit.forms.corrected import Corrected
@@ -235,31 +239,29 @@ class Ours:
         fields = [(coat, "alpha"), (coat, "eta"), (coat, depth), (base, "alpha" if hasattr(base, "alpha") else "albedo")]
         names = [f"{layer.name}.{field}" for layer, field in fields]
         self.start, self.free = parametrise(stack, names, (), "start")
+        size = block_size(1)
+        cut = lambda a: np.stack(np.split(a, range(size, a.shape[-1], size), -1))  # noqa: E731 (pairs last)
+        wi, wo = (np.moveaxis(cut(w.T), 1, -1) for w in (pairs.wi, pairs.wo))
+        weight, target, inverse_sigma = (cut(a) for a in (pairs.weight, pairs.target, pairs.inverse_sigma))
+        blocks = Blocks(wi[:, :, None], wo, weight[..., None], target, inverse_sigma, np.zeros(len(wi), np.int32))
+        self.halves = [
+            jax.device_put(jax.tree.map(operator.itemgetter(every), blocks)) for every in (slice(0, None, 2), slice(1, None, 2))
+        ]
         with jax.enable_x64(True):
             u = self.free.pack(self.start).astype(np.float32)
-            self.material = residuals._derivatives(u, self.start.astype(np.float32), None, free=self.free)
-        size = block_size(1)
-        cuts = [slice(start, start + size) for start in range(0, len(pairs.wi), size)]
-        self.blocks = [
-            jax.device_put(
-                Block(
-                    pairs.wi[at, None],
-                    pairs.wo[at],
-                    pairs.weight[:, at, None],
-                    pairs.target[:, at],
-                    pairs.inverse_sigma[:, at],
-                    None,
-                )
-            )
-            for at in cuts
-        ]
+            self.material = Compiled(residuals._material)(u, self.start.astype(np.float32), None, free=self.free)
+            self.sums = Compiled(_sums)
 
     def values(self) -> np.ndarray:
         return predict(self.start, self.pairs.wi[:, None], self.pairs.wo, self.pairs.weight.T[:, None])
 
     def products(self) -> np.ndarray:
-        begun = [residuals._block_columns(self.material, block, form=self.form) for block in self.blocks]
-        return np.sum([products(part) for part in begun], 0)
+        with jax.enable_x64(True):
+            return np.sum([self.sums(self.material, half, form=self.form) for half in self.halves], 0)
+
+
+def _sums(material: Any, blocks: Blocks, *, form: Any) -> Any:
+    return jnp.sum(lax.map(lambda block: products(residuals._columns(material, block, form=form)), blocks), 0)
 
 
 def draw(stack: Stack, count: int) -> Pairs:

@@ -9,7 +9,6 @@ the same minimum and the remaining cost is shown beside the time.
 
 import argparse
 import time
-from dataclasses import replace
 from typing import Any
 
 import jax
@@ -22,10 +21,9 @@ from scipy.optimize import least_squares
 from layerfit.capture.geometry import frames, sphere_surface
 from layerfit.capture.samples import Samples
 from layerfit.capture.scene import Camera, Sphere
-from layerfit.fit.blocks import arrange, channels_first
+from layerfit.fit.blocks import arrange, weighted
 from layerfit.fit.parameters import parametrise
-from layerfit.fit.residuals import NEAR, initial, step
-from layerfit.fit.solve import NormalLevenbergMarquardt
+from layerfit.fit.residuals import NEAR, Residuals, initial
 from layerfit.forms.corrected import Corrected
 from layerfit.layers import Coat
 from layerfit.render import predict
@@ -69,20 +67,16 @@ def pixels(side: int) -> Samples:
 class Ours:
     def __init__(self, samples: Samples, inverse_sigma: np.ndarray) -> None:
         start, self.free = parametrise(START, NAMES, (), "start")
-        self.start = start.astype(np.float32)
-        self.blocks, self.layout = arrange([samples], None, 0)
-        weight = channels_first(self.layout.scatter([inverse_sigma], 0.0))
-        self.blocks = [replace(block, inverse_sigma=jax.device_put(w)) for block, w in zip(self.blocks, weight, strict=True)]
-        self.solver = NormalLevenbergMarquardt()
+        blocks, layout = arrange([samples], 0)
+        blocks = weighted(blocks, layout, [inverse_sigma])
+        self.residuals = Residuals(start.astype(np.float32), self.free, None, blocks, len(layout.pixel))
 
     def fit(self) -> tuple[np.ndarray, float, int]:
         # As every fit does: to a minimum of a sample of the pixels first, then of all.
-        u, steps = self.free.pack(self.start), 0
-        for blocks, trust in ((self.blocks[:2], 1.0), (self.blocks, NEAR)):
-            state = initial(u, self.solver, trust)
-            while not bool(state.done):
-                u, state = step(u, state, self.free.bounds(), self.start, blocks, free=self.free, solver=self.solver)
-                steps += 1
+        u, steps, state = self.free.pack(self.residuals.start), 0, None
+        for count, trust in ((2, 1.0), (None, NEAR)):
+            u, state, losses = self.residuals.steps(u, initial(u, trust), self.free.bounds(), count)
+            steps += int(np.sum(~np.isnan(losses)))
         return np.concatenate([np.atleast_1d(v) for v in self.free.values(np.asarray(u)).values()]), float(state.loss), steps
 
 

@@ -14,7 +14,6 @@ import argparse
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +27,10 @@ from rich.table import Table
 from layerfit.capture.exr import write_exr
 from layerfit.capture.samples import View, load_reference
 from layerfit.capture.scene import Camera, Directional, Reference, Sphere
-from layerfit.fit.blocks import arrange, channels_first
+from layerfit.fit.blocks import arrange, weighted
 from layerfit.fit.fit import fit
 from layerfit.fit.parameters import parametrise
-from layerfit.fit.residuals import initial, step
-from layerfit.fit.solve import NormalLevenbergMarquardt
+from layerfit.fit.residuals import Residuals, initial
 from layerfit.fit.weights import inverse_sigma
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor
@@ -124,19 +122,19 @@ class Descent:
     def __init__(self, seen: View) -> None:
         start, self.free = parametrise(Stack((), Conductor(**START, masking="smith_separable")), FREE, (), "start")
         self.start, samples = start.astype(np.float32), seen.samples()
-        blocks, layout = arrange([samples], None, 0)
-        weights = channels_first(layout.scatter([inverse_sigma(samples.target, samples.target, None, "uniform")], 0.0))
-        self.blocks = [replace(block, inverse_sigma=jax.device_put(w)) for block, w in zip(blocks, weights, strict=True)]
-        self.solver = NormalLevenbergMarquardt()
+        blocks, layout = arrange([samples], 0)
+        blocks = weighted(blocks, layout, [inverse_sigma(samples.target, samples.target, None, "uniform")])
+        self.residuals = Residuals(self.start, self.free, None, blocks, len(layout.pixel))
 
     def run(self) -> tuple[float, int] | None:
         """As `adam`: seconds and steps until the width is within 1 % for good."""
         began = time.perf_counter()
         arrived: tuple[float, int] | None = None
         with jax.enable_x64(True):
-            u, state, steps = self.free.pack(self.start), initial(self.free.pack(self.start), self.solver), 0
-            while not bool(state.done):
-                u, state = step(u, state, self.free.bounds(), self.start, self.blocks, free=self.free, solver=self.solver)
+            u, steps = self.free.pack(self.start), 0
+            state = initial(u)
+            while not bool(state.done):  # one step at a time, to see when it arrives
+                u, state, _ = self.residuals.steps(u, state, self.free.bounds(), most=1)
                 steps += 1
                 off = abs(float(self.free.values(np.asarray(u))["base.alpha"]) / TRUTH["alpha"] - 1.0)
                 arrived = None if off > TOLERANCE else arrived or (time.perf_counter() - began, steps)

@@ -13,7 +13,6 @@ import argparse
 import dataclasses
 import re
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from rich.table import Table
 from scipy.optimize import least_squares
 
 from layerfit.fit.residuals import initial
-from layerfit.fit.solve import NormalLevenbergMarquardt, columns, normal_equations, products, tangents
+from layerfit.fit.solve import LONGEST, NormalLevenbergMarquardt, columns, descend, normal_equations, products, tangents
 
 FOLDER = Path(__file__).parent / "strd"
 DIGITS = 11.0
@@ -128,23 +127,18 @@ def residual(problem: Problem) -> Callable[[Sequence[Any]], Any]:
 def solve(problem: Problem, start: np.ndarray, solver: NormalLevenbergMarquardt) -> tuple[np.ndarray, int, bool]:
     """Where the solver of the fit ends, after how many steps, and whether it was satisfied."""
     slots = tuple((k,) for k in range(len(start)))
-    derivatives = jax.jit(
-        lambda u: columns(residual(problem), *tangents(lambda u: [a * b for a, b in zip(u, start, strict=True)], list(u)))
-    )
-    u = jnp.ones(len(start))
-    state = initial(u, solver)
-    for k in range(MOST_STEPS):
-        u, state = _advance(u, state, products(derivatives(state.y_eval)), slots=slots, solver=solver)
-        if bool(state.done):
-            return np.asarray(u) * start, k + 1, True
-    return np.asarray(u) * start, MOST_STEPS, False
+    unbounded = np.full(len(start), -np.inf), np.full(len(start), np.inf)
 
+    def evaluate(u: Any, kept: Any) -> Any:
+        made = tangents(lambda u: [a * b for a, b in zip(u, start, strict=True)], list(u))
+        return normal_equations(products(columns(residual(problem), *made)), slots), kept
 
-@partial(jax.jit, static_argnames=("slots", "solver"))
-def _advance(u: Any, state: Any, total: Any, *, slots: Any, solver: Any) -> Any:
-    fn = lambda y, args: normal_equations(total, slots)  # noqa: E731
-    unbounded = {"lower": jnp.full(u.shape, -jnp.inf), "upper": jnp.full(u.shape, jnp.inf)}
-    return solver.step(fn, u, None, unbounded, state, frozenset())[:2]
+    run = jax.jit(lambda u, state: descend(solver, evaluate, u, state, unbounded, LONGEST, ()))
+    u, state, steps = np.ones(len(start)), initial(np.ones(len(start)), solver=solver), 0
+    while steps < MOST_STEPS and not bool(state.done):
+        u, state, losses, _ = run(u, state)
+        steps += int(np.sum(~np.isnan(losses)))
+    return np.asarray(u) * start, steps, bool(state.done)
 
 
 def peer(problem: Problem, start: np.ndarray) -> np.ndarray:

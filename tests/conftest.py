@@ -13,13 +13,14 @@ import jaxtyping
 import pytest
 from jax.extend import source_info_util
 
+from layerfit.__main__ import XLA_FLAGS
 from layerfit._compiled import fusion_emitters
 
 if TYPE_CHECKING:
     import moderngl
 
 # Tests compile much and compute little. What computes much, the fit and the walk, is compiled as its users have it.
-_FLAGS = ["--xla_backend_optimization_level=0", "--xla_disable_hlo_passes=call-inliner"]
+_FLAGS = ["--xla_backend_optimization_level=0", "--xla_disable_hlo_passes=call-inliner", XLA_FLAGS]
 _FLAGS += [f"--{name}=false" for name in fusion_emitters(newer=False)]
 os.environ.setdefault("XLA_FLAGS", " ".join(_FLAGS))
 

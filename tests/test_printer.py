@@ -123,7 +123,7 @@ PRIMITIVES = {
     ),
     "safe_sqrt": (lambda a: safe_sqrt(a), UNIT),
     "safe_divide": (lambda a, b: safe_divide(a, b[0]), UNIT, np.abs(UNIT) - 0.1),
-    "safe_power": (lambda a: safe_power(a, 1.34), UNIT),
+    "power": (lambda a: safe_power(a, 1.34), UNIT),
 }
 
 # An exp that is 17 units in the last place off, as GLSL allows, and what is made of it; the others are rounding.
@@ -140,11 +140,11 @@ LOOSE = {
     "sin": 4e-6,
     "cos": 4e-6,
     "tan": 6e-6,
-    "safe_power": 2e-5,
+    "power": 2e-5,
 }
 
 
-NEAR_ZERO = {"sin", "cos", "tan", "log", "erf", "safe_power", "reduce_sum", "dot"}
+NEAR_ZERO = {"sin", "cos", "tan", "log", "erf", "power", "reduce_sum", "dot"}
 """Where the value is a difference of larger numbers: compared absolutely near 0."""
 
 

@@ -55,7 +55,7 @@ def advance(y, state, bounds, total):
 
 def minimise(start, lower=-np.inf, upper=np.inf, target=TARGET, residual=residual):
     y = jnp.asarray(start, float)
-    state = initial(y, SOLVER)
+    state = initial(y)
     path = []
     for _ in range(200):
         total = products(jacobian(state.y_eval, target, residual))
@@ -122,7 +122,7 @@ def test_a_step_that_the_bounds_turn_uphill_is_shortened():
     away = y - valley
     cut = jnp.clip(valley, lower, upper) - valley
     assert cut @ gram @ cut > away @ gram @ away, "the test is none: the cut step goes downhill"
-    state = initial(y, solver, 1e6)
+    state = initial(y, 1e6)
     losses = []
     for _ in range(60):
         y, state = solver.step(fn, y, None, {"lower": lower, "upper": upper}, state, frozenset())[:2]

@@ -17,6 +17,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import export, lax
+from jax.extend.core import Primitive
+from jax.interpreters import batching, mlir
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., Any])
@@ -155,10 +157,26 @@ def _(primals: Any, tangents: Any) -> Any:
     return quotient, where(inside, (dx - quotient * dy) * inverse, 0.0)
 
 
+_power_p = Primitive("power")
+"""x ** exponent of positive numbers and a constant exponent: `pow` in a shader. The library function that `lax.pow` becomes on a CPU takes
+one number at a time; exponential and logarithm, of which GLSL makes its own too, take a vector of them."""
+_power_p.def_impl(jax.jit(lambda x, *, exponent: _power_p.bind(x, exponent=exponent), static_argnames="exponent"))
+_power_p.def_abstract_eval(lambda x, *, exponent: x)
+batching.defvectorized(_power_p)
+
+
+def _power(x: jax.Array, *, exponent: float) -> jax.Array:
+    # In float32 it is a few units in the last place off; float64 is for truth.
+    return jnp.exp(exponent * jnp.log(x)) if x.dtype == np.float32 else jnp.power(x, exponent)
+
+
+mlir.register_lowering(_power_p, mlir.lower_fun(_power, multiple_results=False))
+
+
 @partial(jax.custom_jvp, nondiff_argnums=(1,))
 def safe_power(x: jax.Array, exponent: float) -> jax.Array:
     """x ** exponent for x >= 0 and a constant exponent > 0; value and derivative 0 at and below 0."""
-    return jnp.power(jnp.maximum(x, 1e-30), exponent)
+    return _power_p.bind(jnp.maximum(x, 1e-30), exponent=float(exponent))
 
 
 @safe_power.defjvp

@@ -1,7 +1,6 @@
 """The program, the options that commands share, and how a command becomes one of it."""
 
 import functools
-import gc
 import inspect
 import sys
 from collections.abc import Callable
@@ -85,8 +84,6 @@ def _begin() -> None:
 
 def main() -> None:
     """Run the command line; every fault of input or machine is one message and exit code 2."""
-    # A trace makes objects by the million, few of them rubbish: looking for it was a tenth of its time.
-    gc.set_threshold(50_000, 20, 20)
     manner.json = manner.quiet = manner.verbose = False
     try:
         app()

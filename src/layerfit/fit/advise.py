@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..stack import Stack
 from .blocks import STRATA, arrange, strata
 from .parameters import Parametrisation, parametrise, with_fixed
-from .residuals import depths, rows
+from .residuals import Residuals, depths
 from .uncertainty import WEAK_SIGMA
 from .weights import FLOOR_SHARE, MODEL_SHARE, brightness, noise_law
 
@@ -153,9 +153,9 @@ class _Asked:
         scale = view.scales(self.stack)
         scale = np.ones(len(self.stack.layers) + 1) if scale is None else scale
         dark = dataclasses.replace(samples, target=np.zeros_like(samples.target))
-        blocks, layout = arrange([dark], scale[None], self.seed, self.stack.needs)
-        blocks = [dataclasses.replace(block, inverse_sigma=np.ones_like(block.inverse_sigma)) for block in blocks]
-        jacobian, model = rows(self.u, self.stack, blocks, free=self.free)
+        blocks, layout = arrange([dark], self.seed, self.stack.needs)
+        blocks = dataclasses.replace(blocks, inverse_sigma=np.ones_like(blocks.inverse_sigma))
+        jacobian, model = Residuals(self.stack, self.free, scale[None], blocks, len(layout.pixel)).rows(self.u)
         pixel = layout.pixel.ravel()
         counts = (pixel >= 0) & self._lit(samples)[pixel]
         if not counts.any():

@@ -9,7 +9,7 @@ from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from .._chunk import struct
 from .._place import Place
@@ -18,16 +18,16 @@ from ..render import block_size
 
 
 @struct
-class Block:
-    """Pixels of one reference, channels first where there are any."""
+class Blocks:
+    """Pixels of all references, block by block, channels before pixels where there are any."""
 
-    wi: Float[Array, "n s 3"]
-    wo: Float[Array, "n 3"]
-    weight: Float[Array, "3 n s"]
-    target: Float[Array, "3 n"]
-    inverse_sigma: Float[Array, "3 n"]
-    scale: Any
-    """(layers,): thickness over that of the material; absent where it is 1 everywhere."""
+    wi: Float[Array, "b n s 3"]
+    wo: Float[Array, "b n 3"]
+    weight: Float[Array, "b 3 n s"]
+    target: Float[Array, "b 3 n"]
+    inverse_sigma: Float[Array, "b 3 n"]
+    of: Int[Array, " b"]
+    """Reference that the pixels of a block are from."""
     place: Place | None = None
     """Where the pixels are on the surface; absent where the material is the same everywhere, or is fitted by its mean."""
     curve: Any = None
@@ -78,16 +78,18 @@ def stratified(samples: Samples, seed: int) -> np.ndarray:
     return np.argsort(key)
 
 
-def arrange(
-    references: list[Samples], scales: np.ndarray | None, seed: int, needs: tuple[str, ...] = ()
-) -> tuple[list[Block], Layout]:
-    """Blocks of all references; `scales` (references, layers) or None; `needs` is what the material has to know of the place of a pixel.
+LEAST = 16
+"""Blocks that there is room for at least. Room for a power of two of them: a compiled step serves all images up to the same."""
+
+
+def arrange(references: list[Samples], seed: int, needs: tuple[str, ...] = ()) -> tuple[Blocks, Layout]:
+    """Blocks of all references, with weights of 0; `needs` is what the material has to know of the place of a pixel.
 
     The references take turns, block by block.
     """
     lights = max(s.wi.shape[1] for s in references)
     longest = max(len(s.index) for s in references)
-    size = min(block_size(lights), _power_of_two(longest))
+    size = min(block_size(lights), _power_of_two(longest, 32))
     rows: list[tuple[int, np.ndarray]] = []
     for k, samples in enumerate(references):
         order = stratified(samples, seed + k)
@@ -116,15 +118,20 @@ def arrange(
     weight = channels_first(layout.scatter([padded("weight", s) for s in references], 0.0))
     target = channels_first(layout.scatter([s.target for s in references], 0.0))
     where = {name: layout.scatter([getattr(s.place, name) for s in references], 0.0) for name in needs}
+    of = np.array([k for k, _ in rows], np.int32)
+    arrays = (held(a) for a in (wi, wo, weight, target, np.zeros_like(target), of))
+    return Blocks(*arrays, Place(**{name: held(values) for name, values in where.items()}) if where else None), layout
 
-    def there(b: int) -> Place | None:
-        return Place(**{name: values[b] for name, values in where.items()}) if where else None
 
-    blocks = [
-        jax.device_put(Block(wi[b], wo[b], weight[b], target[b], np.zeros_like(target[b]), _scale(scales, k), there(b)))
-        for b, (k, _) in enumerate(rows)
-    ]
-    return blocks, layout
+def weighted(blocks: Blocks, layout: Layout, weights: list[np.ndarray]) -> Blocks:
+    """The blocks with weights (pixels, channels) of the residuals of each reference."""
+    return dataclasses.replace(blocks, inverse_sigma=held(channels_first(layout.scatter(weights, 0.0))))
+
+
+def held(values: np.ndarray) -> Any:
+    """An array (blocks, ...) where JAX has its own, with room for more blocks."""
+    missing = _power_of_two(len(values), LEAST) - len(values)
+    return jax.device_put(np.pad(values, [(0, missing)] + [(0, 0)] * (np.ndim(values) - 1)))
 
 
 def channels_first(values: np.ndarray) -> np.ndarray:
@@ -132,10 +139,6 @@ def channels_first(values: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.moveaxis(values, -1, 1))
 
 
-def _scale(scales: np.ndarray | None, reference: int) -> np.ndarray | None:
-    return None if scales is None else scales[reference].astype(np.float32)
-
-
-def _power_of_two(n: int) -> int:
-    """The smallest power of two that is not below n, and not below 32."""
-    return max(32, 2 ** (n - 1).bit_length())
+def _power_of_two(n: int, least: int) -> int:
+    """The smallest power of two that is not below n, and not below the least."""
+    return max(least, 2 ** (n - 1).bit_length())

@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import jax
@@ -16,13 +16,12 @@ from ..documents import nearest
 from ..errors import InputError
 from ..stack import Stack
 from . import discrepancy
-from .blocks import Block
 from .parameters import LIGHT, parametrise, with_fixed
 from .problem import Problem
 from .profile import ABSORBING, Profile, along, deep, lower_limit, scatter, threshold
-from .residuals import NEAR, rows
+from .residuals import NEAR
 from .result import FitResult, Held
-from .starts import FINE_STEPS, LEVEL, SCREENED, Minimum, distinct, in_sight, ranked, search, space_filling
+from .starts import COARSE_STEPS, FINE_STEPS, LEVEL, SCREENED, Minimum, distinct, in_sight, ranked, search, space_filling
 from .uncertainty import Uncertainty, estimate
 from .weights import misfit
 
@@ -92,10 +91,10 @@ class _Fit:
         best, converged = minima[0], False
         for k in range(ROUNDS):
             problem.weigh(best.vector)
-            best, converged = problem.descend(best, problem.blocks, FINE_STEPS, f"fine {k + 1}")
+            best, converged = next(problem.descend([best], f"fine {k + 1}", FINE_STEPS))
             self.progress("fine", (k + 1) / ROUNDS)
         u, cost, gram = best.vector, best.cost, best.gram
-        jacobian, residual = rows(u, problem.start, problem.blocks, free=problem.free)
+        jacobian, residual = problem.residuals.rows(u)
         uncertainty = estimate(gram, jacobian, residual, problem.sectors(), problem.alike())
         models = problem.models(u, problem.samples)
         off = self._discrepancy(u, models, jacobian, gram) if self.model_error else None
@@ -118,7 +117,7 @@ class _Fit:
             steps=len(problem.trace),
             minima=minima,
             notes=self.notes,
-            trace=problem.trace,
+            trace=sorted(problem.trace, key=lambda row: row.time_s),
             models=models,
             misfit=beyond,
             profiles=profiles,
@@ -131,26 +130,25 @@ class _Fit:
 
     def _search(self) -> list[Minimum]:
         """Minima of the coarse fit, best first."""
-        sample = self.problem.blocks[: max(COARSE_BLOCKS, len(self.problem.views))]
+        problem = self.problem
+        views = len(problem.views)
+        few = min(max(COARSE_BLOCKS, views), problem.count)
 
-        def descend(at: Minimum, most: int, stage: str) -> Minimum:
-            return self.problem.descend(at, sample, most, stage, 1.0 if stage == "coarse" else NEAR)[0]
+        def descend(at: Sequence[Minimum], stage: str) -> Iterator[Minimum]:
+            coarse = stage == "coarse"
+            most, trust = (COARSE_STEPS, 1.0) if coarse else (FINE_STEPS, NEAR)
+            return (reached for reached, _ in problem.descend(at, stage, most, few, trust))
 
-        level = LEVEL * self.problem.shine(sample)
-        return search(
-            self._points(self.problem.blocks[: len(self.problem.views)]),
-            descend,
-            level,
-            lambda share: self.progress("coarse", share),
-        )
+        level = LEVEL * problem.shine(few)
+        return search(self._points(views), descend, level, lambda share: self.progress("coarse", share))
 
-    def _points(self, blocks: Sequence[Block]) -> list[np.ndarray]:
+    def _points(self, count: int) -> list[np.ndarray]:
         """Starts: the given one, and the best of many space-filling ones. What has no effect at any of them is held."""
         problem = self.problem
         drawn = space_filling(problem.free, SCREENED * (self.starts - 1), self.seed)
         order = np.argsort([problem.glance(point) for point in drawn], kind="stable")
         points = [problem.free.pack(problem.start), *(drawn[k] for k in order[: self.starts - 1])]
-        effects = [problem.effect(point, blocks) for point in points]
+        effects = problem.effects(points, count)
         seen = [effect > 1e-7 * effect.max() for effect in effects if effect is not None]
         if not seen:
             raise InputError(f"{self.where}: the start gives no finite image; choose other values in [material]")
@@ -182,8 +180,8 @@ class _Fit:
         if len(near) == 1:
             return minima
         problem.weigh(near[0].vector)
-        level = LEVEL * problem.shine(problem.blocks)
-        ends = distinct([problem.descend(m, problem.blocks, FINE_STEPS, "compare")[0] for m in near], level)
+        level = LEVEL * problem.shine()
+        ends = distinct([reached for reached, _ in problem.descend(near, "compare", FINE_STEPS)], level)
         return [*ranked(ends, level), *(m for m in minima if not any(m is other for other in near))]
 
     def _discrepancy(
@@ -206,7 +204,7 @@ class _Fit:
         """
         problem = self.problem
         residuals = sum(s.target.size for s in problem.samples)
-        unexplained, even = 0.5 * misfit**2 * problem.shine(problem.blocks), 2.0 * best.cost / residuals
+        unexplained, even = 0.5 * misfit**2 * problem.shine(), 2.0 * best.cost / residuals
         asked = [slot for f in problem.free.free if f.name in self.profile for slot in f.slots]
         deeper = [
             slot for slot in deep(problem.free.free, problem.material(best.vector), uncertainty.sigma) if slot not in asked

@@ -2,8 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import jax
 import numpy as np
@@ -14,16 +13,19 @@ from ..capture.load import AnyView
 from ..capture.samples import Samples
 from ..stack import Stack
 from . import discrepancy
-from .blocks import Block, arrange, channels_first
-from .difference import Curve, compared, curve, slope
+from .blocks import arrange, channels_first, held, weighted
+from .difference import compared, curve, slope
 from .parameters import Parametrisation
 from .pixels import DIRECTIONS, chosen, scales, sectors
-from .residuals import NEAR, begin, begin_solver, initial, scaled, step
+from .residuals import NEAR, Residuals, initial, scaled
 from .result import Row
-from .solve import NormalLevenbergMarquardt
+from .solve import LONGEST
 from .starts import FINE_STEPS, Minimum
 from .uncertainty import GROUPS
 from .weights import Lost, brightness, inverse_sigma, lost, noise_law, robust
+
+AT_ONCE = 2_000_000
+"""Evaluations of a BRDF that are not interrupted: a second of them."""
 
 
 class Problem:
@@ -34,13 +36,25 @@ class Problem:
         self.trace: list[Row] = []
         self.began = time.perf_counter()
         self.samples = [view.samples(chosen(view, len(views), seed), DIRECTIONS, seed) for view in views]
-        blocks, self.layout = arrange(self.samples, scales(views, start), seed, start.needs)
+        self.blocks, self.layout = arrange(self.samples, seed, start.needs)
+        self.scale = scales(views, start)
         self.curves = [curve(metric, brightness(s.target)) for s in self.samples]
-        self.blocks = [_compared_by(self.curves[of[0]], block) for of, block in zip(self.layout.reference, blocks, strict=True)]
+        if self.curves[0]:
+            by = [self.curves[k] for k in self.layout.reference[:, 0]]
+            each = jax.tree.map(lambda *of: held(np.stack(of)[:, :, None]), *by)  # beside the pixels of a channel
+            self.blocks = dataclasses.replace(self.blocks, curve=each)
         first = self.layout.pixel[: len(views)]  # a block of each reference, in their order
         self.few = [s.some(block[block >= 0]) for s, block in zip(self.samples, first, strict=True)]
-        self.solver = NormalLevenbergMarquardt()
         self.release(start, free)
+
+    @property
+    def count(self) -> int:
+        """Blocks of pixels."""
+        return len(self.layout.pixel)
+
+    @property
+    def residuals(self) -> Residuals:
+        return Residuals(self.start, self.free, self.scale, self.blocks, self.count)
 
     def release(self, start: Stack, free: Parametrisation) -> None:
         """Set what is fitted, from where."""
@@ -49,11 +63,9 @@ class Problem:
 
     def begin(self, model_error: bool) -> None:
         """Have what steps, pictures and, if asked for, the random walk need compiled, while other work goes on."""
-        origin = self.free.pack(self.start)
-        begin_solver(origin, self.bounds, self.blocks, free=self.free, solver=self.solver)
+        self.residuals.begin()
         if model_error:
             discrepancy.begin(self.start)
-        begin(origin, self.start, self.blocks, free=self.free)
         for view, samples in zip(self.views, self.samples, strict=True):
             stack = scaled(self.start, view.scales(self.start))
             render.begin(stack, samples.wi.shape[1], narrowed(samples.place, stack.needs))
@@ -66,12 +78,11 @@ class Problem:
             models = self.models(u, self.samples)
             values = self.weights(models, self.metric)
             self._give_back(models)
-        weight = channels_first(self.layout.scatter(values, 0.0))
-        self.brightness = [
-            float(np.sum((w * compared(block.target, block.curve)).astype(float) ** 2))
-            for w, block in zip(weight, self.blocks, strict=True)
-        ]
-        self.blocks = [_weighted(block, w) for block, w in zip(self.blocks, weight, strict=True)]
+        self.blocks = weighted(self.blocks, self.layout, values)
+        weight, target, by = jax.tree.map(
+            lambda a: a[: self.count], (self.blocks.inverse_sigma, self.blocks.target, self.blocks.curve)
+        )
+        self.brightness = np.sum(np.square(np.asarray(weight * compared(target, by)), dtype=float), (1, 2))
 
     def _give_back(self, models: Sequence[np.ndarray]) -> None:
         """Set the targets to what the references are without fireflies, but for their light: that is everywhere."""
@@ -80,10 +91,7 @@ class Problem:
             samples.target if off is None else samples.target + off.mean
             for off, samples in zip(self.lost, self.samples, strict=True)
         ]
-        target = channels_first(self.layout.scatter(targets, 0.0))
-        self.blocks = [
-            dataclasses.replace(block, target=jax.device_put(t)) for block, t in zip(self.blocks, target, strict=True)
-        ]
+        self.blocks = dataclasses.replace(self.blocks, target=held(channels_first(self.layout.scatter(targets, 0.0))))
 
     def _lost(self, model: np.ndarray, samples: Samples) -> Lost | None:
         """Light that the loss takes from fireflies, where a file says that it has any."""
@@ -93,6 +101,11 @@ class Problem:
         residual = (model - samples.target) * weight
         return lost(residual, robust(residual, self.loss), weight, noise_law(np.maximum(model, 0.0), samples.noise))
 
+    @property
+    def inverse_sigma(self) -> np.ndarray:
+        """Weights of the residuals, (blocks, pixels, channels)."""
+        return np.moveaxis(np.asarray(self.blocks.inverse_sigma)[: self.count], 1, -1)
+
     def alike(self) -> list[np.ndarray]:
         """Errors of the weighted residuals that all pixels of a channel of a reference have together."""
         found = []
@@ -101,8 +114,7 @@ class Problem:
                 error = self.layout.scatter(
                     [off.error if j == k else np.zeros_like(s.target) for j, s in enumerate(self.samples)], 0.0
                 )
-                weights = np.stack([np.asarray(block.inverse_sigma).T for block in self.blocks])
-                found += [(error * weights * one).reshape(-1, 3) for one in np.eye(3) if np.any(error * one)]
+                found += [(error * self.inverse_sigma * one).reshape(-1, 3) for one in np.eye(3) if np.any(error * one)]
         return found
 
     def _even(self, samples: Sequence[Samples]) -> list[np.ndarray]:
@@ -138,27 +150,15 @@ class Problem:
         found = self.free.light(self.free.fields(u), np)
         return np.ones(3, np.float32) if found is None else found.astype(np.float32)
 
-    def _step(self, u: Any, state: Any, blocks: Sequence[Block]) -> Any:
-        return step(u, state, self.bounds, self.start, blocks, free=self.free, solver=self.solver)
+    def descend(
+        self, at: Sequence[Minimum], stage: str, most: int, count: int | None = None, trust: float = NEAR
+    ) -> Iterator[tuple[Minimum, bool]]:
+        """Run the solver from some points, side by side, on some blocks; gives where each comes to, and whether it converged."""
+        begun = [_Descent(self, point, stage, most, count or self.count, trust) for point in at]
+        return (descent.ended() for descent in begun)
 
-    def descend(self, at: Minimum, blocks: Sequence[Block], most: int, stage: str, trust: float = NEAR) -> tuple[Minimum, bool]:
-        """Run the solver from a point on some blocks; returns where it came to, and whether it converged."""
-        u = np.asarray(at.vector, float)
-        state = initial(u, self.solver, trust)
-        scale = max(self.shine(blocks), 1e-30)
-        for k in range(most):
-            u, state = self._step(u, state, blocks)
-            error = float(np.sqrt(2.0 * float(state.loss) / scale))
-            self.trace.append(Row(time.perf_counter() - self.began, stage, at.starts[0], k, error))
-            if bool(state.done):
-                break
-        finite = bool(np.isfinite(float(state.loss)))
-        cost = float(state.loss) if finite else np.inf
-        reached = dataclasses.replace(at, vector=np.asarray(u), cost=cost, gram=np.asarray(state.gram))
-        return reached, bool(state.done) and finite
-
-    def shine(self, blocks: Sequence[Block]) -> float:
-        return sum(self.brightness[: len(blocks)])
+    def shine(self, count: int | None = None) -> float:
+        return float(np.sum(self.brightness[:count]))
 
     def refit(self, u: np.ndarray, slots: int | Sequence[int]) -> Minimum:
         """Where all but some entries of the vector go from there."""
@@ -166,7 +166,7 @@ class Problem:
         still = np.isin(np.arange(len(u)), slots)
         self.bounds = np.where(still, u, kept[0]), np.where(still, u, kept[1])
         steps = len(self.trace)
-        reached, _ = self.descend(Minimum((0,), u, np.inf, np.eye(len(u))), self.blocks, FINE_STEPS, "profile")
+        reached, _ = next(self.descend([Minimum((0,), u, np.inf, np.eye(len(u)))], "profile", FINE_STEPS))
         self.bounds = kept
         del self.trace[steps:]  # the fit had ended
         return reached
@@ -181,10 +181,10 @@ class Problem:
         cost = sum(np.sum(np.square(r, dtype=float)) for r in residual)
         return float(cost) if np.isfinite(cost) else np.inf
 
-    def effect(self, u: np.ndarray, blocks: Sequence[Block]) -> np.ndarray | None:
-        """How much the images change with each parameter; None where they are not finite."""
-        _, state = self._step(u, initial(u, self.solver), blocks)
-        return np.sqrt(np.diag(np.asarray(state.gram))) if np.isfinite(float(state.loss)) else None
+    def effects(self, points: Sequence[np.ndarray], count: int) -> list[np.ndarray | None]:
+        """How much the images change with each parameter, at some points; None where they are not finite."""
+        states = [self.residuals.steps(u, initial(u), self.bounds, count, 1)[1] for u in points]
+        return [np.sqrt(np.diag(np.asarray(s.gram))) if np.isfinite(float(s.loss)) else None for s in states]
 
     def discrepancy(
         self, u: np.ndarray, models: Sequence[np.ndarray], jacobian: np.ndarray, gram: np.ndarray, seed: int
@@ -192,7 +192,7 @@ class Problem:
         """What the form gets wrong at a point, and what that makes of the parameters."""
         place = self.layout.reference.ravel(), self.layout.pixel.ravel()
         slopes = self.layout.scatter([slope(m, by) for m, by in zip(models, self.curves, strict=True)], 0.0).reshape(-1, 3)
-        weights = np.concatenate([np.asarray(block.inverse_sigma).T for block in self.blocks])
+        weights = self.inverse_sigma.reshape(-1, 3)
         return discrepancy.measure(
             self.material(u), self.views, self.samples, place, jacobian, slopes * weights * self.light(u), gram, seed
         )
@@ -202,10 +202,40 @@ class Problem:
         return self.layout.scatter([sectors(samples, GROUPS) for samples in self.samples], -1.0).ravel()
 
 
-def _compared_by(by: Curve | None, block: Block) -> Block:
-    """A block that is compared in other values than its own; they stand beside channels that come first."""
-    return block if by is None else dataclasses.replace(block, curve=jax.device_put(jax.tree.map(lambda a: a[:, None], by)))
+class _Descent:
+    """The solver on its way from a point: a few steps at a time, so that it can be told of and interrupted."""
 
+    def __init__(self, problem: Problem, at: Minimum, stage: str, most: int, count: int, trust: float):
+        self.problem, self.at, self.stage, self.left, self.count = problem, at, stage, most, count
+        self.residuals = problem.residuals
+        self.u = np.asarray(at.vector, float)
+        self.state = initial(self.u, trust)
+        self.taken = 0
+        _, pixels, lights, _ = problem.blocks.wi.shape
+        self.at_once = int(np.clip(AT_ONCE // (count * pixels * lights), 1, LONGEST))
+        self._begin()
 
-def _weighted(block: Block, inverse_sigma: np.ndarray) -> Block:
-    return dataclasses.replace(block, inverse_sigma=jax.device_put(inverse_sigma))
+    def _begin(self) -> None:
+        self.began = time.perf_counter()
+        most = min(self.left, self.at_once)
+        self.u, self.state, self.losses = self.residuals.steps(self.u, self.state, self.problem.bounds, self.count, most)
+
+    def ended(self) -> tuple[Minimum, bool]:
+        while not self._done():
+            self._begin()
+        finite = bool(np.isfinite(float(self.state.loss)))
+        cost = float(self.state.loss) if finite else np.inf
+        reached = dataclasses.replace(self.at, vector=np.asarray(self.u), cost=cost, gram=np.asarray(self.state.gram))
+        return reached, bool(self.state.done) and finite
+
+    def _done(self) -> bool:
+        """Wait for the steps that were begun, and put them on record; their times are spread evenly over them."""
+        losses = np.asarray(self.losses)
+        losses = losses[~np.isnan(losses)]
+        seconds = np.linspace(self.began, time.perf_counter(), len(losses) + 1)[1:] - self.problem.began
+        errors = np.sqrt(2.0 * losses / max(self.problem.shine(self.count), 1e-30))
+        for second, error in zip(seconds.tolist(), errors.tolist(), strict=True):
+            self.problem.trace.append(Row(second, self.stage, self.at.starts[0], self.taken, error))
+            self.taken += 1
+        self.left -= len(losses)
+        return bool(self.state.done) or self.left <= 0

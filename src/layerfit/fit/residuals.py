@@ -1,18 +1,19 @@
-"""Residuals of a material against blocks of samples, and the compiled step of a fit."""
+"""Residuals of a material against blocks of samples, and the compiled descent of a fit."""
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import lax
 
 from .._compiled import Compiled
 from ..render import shade
-from ..stack import Stack, prepared
-from .blocks import Block
+from ..stack import Stack
+from .blocks import Blocks
 from .parameters import Parametrisation
-from .solve import columns, dense, normal_equations, products, tangents
+from .solve import LONGEST, SOLVER, columns, dense, descend, normal_equations, products, tangents
 
 
 def depths(layer: Any) -> list[str]:
@@ -40,7 +41,7 @@ def _material(u: Any, start: Stack, scale: Any, *, free: Parametrisation) -> tup
     return tangents(made, free.fields(u))
 
 
-def _columns(material: tuple[Any, Any], block: Block, *, form: Any) -> Any:
+def _columns(material: tuple[Any, Any], block: Blocks, *, form: Any) -> Any:
     """The model's derivatives and residual over one block of pixels, in the precision of the block."""
 
     def residual(made: Any) -> Any:
@@ -54,71 +55,84 @@ def _columns(material: tuple[Any, Any], block: Block, *, form: Any) -> Any:
     return columns(residual, *material)
 
 
-def _advance(u: Any, state: Any, bounds: Any, total: Any, *, free: Parametrisation, solver: Any) -> Any:
-    """The solver's new point and the leaves of its new state, from the products at its trial point."""
-    fn = lambda y, args: normal_equations(total, tuple(f.slots for f in free.free))  # noqa: E731
-    u, state, _ = solver.step(fn, u, None, {"lower": bounds[0], "upper": bounds[1]}, state, frozenset())
-    return u, jax.tree.leaves(state)
-
-
-_derivatives = Compiled(_material, optimise=1)
-_block_columns = Compiled(_columns)
-_solver_step = Compiled(_advance, optimise=1)
-
-
-def begin(u: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation) -> None:
-    """Have what a step needs compiled, while other work goes on."""
-    with jax.enable_x64(False):
-        lit = free.light(free.fields(np.asarray(u, np.float32)), np)
-        made = prepared.begin(scaled(start.astype(np.float32), blocks[0].scale)), lit
-    # The larger part first; that of the material goes on beside it.
-    along = jax.tree.map(lambda a: jax.ShapeDtypeStruct((len(free.free), *a.shape), a.dtype), made)
-    _block_columns.begin((made, along), blocks[0], form=start.form)
-    _derivatives.begin(np.asarray(u).astype(np.float32), start, blocks[0].scale, free=free)
-
-
-def begin_solver(u: Any, bounds: Any, blocks: Sequence[Block], *, free: Parametrisation, solver: Any) -> None:
-    """The same of the solver's part of it, which is traced with small things that are compiled at once: begin it before what is large."""
-    total = np.zeros((len(blocks[0].target), len(free.free) + 1, len(free.free) + 1))
-    _solver_step.begin(u, initial(u, solver), bounds, total, free=free, solver=solver)
-
-
-def _started(u: np.ndarray, start: Stack, blocks: Sequence[Block], free: Parametrisation) -> list[Any]:
-    """Columns of all blocks, begun; references of one thickness share the prepared material."""
-    materials: dict[bytes | None, Any] = {}
-    begun = []
-    for block in blocks:
-        key = None if block.scale is None else np.asarray(block.scale).tobytes()
-        if key not in materials:
-            materials[key] = _derivatives(u, start, block.scale, free=free)
-        begun.append(_block_columns(materials[key], block, form=start.form))
-    return begun
-
-
-def step(
-    u: Any, state: Any, bounds: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation, solver: Any
-) -> tuple[Any, Any]:
-    """One step of the solver from `u` over some blocks of pixels: the new point and the new state."""
-    trial = np.asarray(state.y_eval).astype(blocks[0].wi.dtype)
-    # All are started before the first is waited for: what cores there are work side by side.
-    started = _started(trial, start, blocks, free)
-    total = np.sum([products(part) for part in started], 0)
-    u, leaves = _solver_step(u, state, bounds, total, free=free, solver=solver)
-    return u, jax.tree.unflatten(jax.tree.structure(state), leaves)
-
-
-def rows(u: Any, start: Stack, blocks: Sequence[Block], *, free: Parametrisation) -> tuple[np.ndarray, np.ndarray]:
-    """Jacobian (pixels, channels, parameters) and residuals (pixels, channels) at `u`, weighted; the pixels block by block."""
+def _descend(
+    u: Any, state: Any, bounds: Any, start: Stack, scale: Any, blocks: Blocks, count: Any, most: Any, *, free: Parametrisation
+) -> Any:
+    """The solver over the first `count` blocks; see `solve.descend`. Kept are the columns of the last evaluation."""
     slots = tuple(f.slots for f in free.free)
-    parts = [dense(part, slots) for part in _started(np.asarray(u).astype(blocks[0].wi.dtype), start, blocks, free)]
-    jacobian, residual = zip(*parts, strict=True)
-    return np.concatenate(jacobian), np.concatenate(residual)
+    fields, dtype = len(slots) + 1, blocks.wi.dtype
+
+    def evaluate(u: Any, kept: Any) -> Any:
+        u = u.astype(dtype)
+        # References of other thickness are made of other materials.
+        made = (
+            _material(u, start, None, free=free)
+            if scale is None
+            else lax.map(lambda s: _material(u, start, s, free=free), scale.astype(dtype))
+        )
+
+        def add(k: Any, sums: Any) -> Any:
+            total, kept = sums
+            block = jax.tree.map(lambda a: a[k], blocks)
+            found = _columns(made if scale is None else jax.tree.map(lambda a: a[block.of], made), block, form=start.form)
+            return total + products(found), lax.dynamic_update_index_in_dim(kept, found, k, 0)
+
+        total, kept = lax.fori_loop(0, count, add, (jnp.zeros((3, fields, fields)), kept))
+        return normal_equations(total, slots), kept
+
+    size, channels, pixels = blocks.target.shape
+    kept = jnp.zeros((size, fields, channels, pixels), dtype)
+    u, state, losses, kept = descend(SOLVER, evaluate, u, state, bounds, most, kept)
+    return u, jax.tree.leaves(state), losses, kept
+
+
+_descent = Compiled(_descend)
+
+
+@dataclasses.dataclass(frozen=True)
+class Residuals:
+    """Weighted residuals of a material against references, as a function of the vector of its free fields."""
+
+    start: Stack
+    """What is not free, in the precision of the blocks."""
+    free: Parametrisation
+    scale: np.ndarray | None
+    """(references, layers): thickness over that of the material, the base last; None where it is 1 everywhere."""
+    blocks: Blocks
+    count: int
+    """Blocks that hold pixels."""
+
+    def begin(self) -> None:
+        """Have what a descent needs compiled, while other work goes on."""
+        u = self.free.pack(self.start)
+        _descent.begin(*self._arguments(u, initial(u), self.free.bounds(), 0, 0), free=self.free)
+
+    def steps(self, u: Any, state: Any, bounds: Any, count: int | None = None, most: int = LONGEST) -> tuple[Any, Any, Any]:
+        """At most `most` steps of the solver from `u` over the first `count` blocks: the new point and state, and the loss after each step
+        (NaN where none was taken). They are begun, not waited for: descents side by side use what cores there are.
+        """
+        u, leaves, losses, _ = self._run(u, state, bounds, self.count if count is None else count, most)
+        return u, jax.tree.unflatten(jax.tree.structure(state), leaves), losses
+
+    def rows(self, u: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Jacobian (pixels, channels, parameters) and residuals (pixels, channels) at `u`; the pixels block by block."""
+        # By a step that leads nowhere: what a step evaluates is compiled already.
+        *_, kept = self._run(u, initial(u), self.free.bounds(), self.count, 1)
+        slots = tuple(f.slots for f in self.free.free)
+        jacobian, residual = zip(*(dense(part, slots) for part in np.asarray(kept)[: self.count]), strict=True)
+        return np.concatenate(jacobian), np.concatenate(residual)
+
+    def _run(self, *at: Any) -> Any:
+        return _descent(*self._arguments(*at), free=self.free)
+
+    def _arguments(self, u: Any, state: Any, bounds: Any, count: int, most: int) -> tuple[Any, ...]:
+        return u, state, bounds, self.start, self.scale, self.blocks, np.int32(count), np.int32(most)
 
 
 NEAR = 1e4
 """Trust in the first step from a point that is near a minimum: nearly that of Gauss and Newton."""
 
 
-def initial(u: Any, solver: Any, trust: Any = 1.0) -> Any:
+def initial(u: Any, trust: Any = 1.0, solver: Any = SOLVER) -> Any:
     """State of the solver before its first step at `u`; `trust` is the inverse of its damping."""
     return solver.init(None, u, None, {"trust": trust}, None, None, frozenset())

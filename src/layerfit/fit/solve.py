@@ -7,7 +7,7 @@ accumulated from the columns without a tall matrix ever being factored. Sums are
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
@@ -33,29 +33,30 @@ def tangents(material: Callable[[list[Any]], Any], fields: list[Any]) -> tuple[A
     return jax.vmap(along, out_axes=(None, 0))(one_hot)
 
 
-def columns(residual: Callable[[Any], Any], prepared: Any, tangents: Any) -> list[Float[Array, "c n"]]:
+def columns(residual: Callable[[Any], Any], prepared: Any, tangents: Any) -> Float[Array, "k c n"]:
     """Columns of the Jacobian, one a field, and the residual as the last.
 
     `residual` maps a prepared material to (channels, pixels); its channel c must depend on channel c of a colour only.
     """
     # Not `linearize`: half as long again to trace and to compile, and no faster to run.
     r, along = jax.vmap(lambda tangent: jax.jvp(residual, (prepared,), (tangent,)), out_axes=(None, 0))(tangents)
-    return [*along, r]
+    return jnp.concatenate([along, r[None]])
 
 
-def products(columns: Sequence[Any]) -> np.ndarray:
-    """Inner products of `columns` over the pixels, channel by channel and in float64: (c, k, k).
+# A function of its own to the compiler: in one loop with what makes the columns, it evaluates the model one number at a time.
+@jax.jit
+def products(columns: Float[Array, "k c n"]) -> Float[Array, "c k k"]:
+    """Inner products of `columns` over the pixels, channel by channel and in float64; `normal_equations` reads them.
 
-    Products of several blocks of pixels add up; `normal_equations` reads them. They are not part of the compiled function, because
-    a compiler that sees the columns stacked evaluates the model inside the loop that stacks them, one number at a time.
+    Those of several blocks of pixels add up.
     """
-    rows = np.stack([np.asarray(column) for column in columns], 1).astype(float)
-    return rows @ rows.swapaxes(1, 2)
+    rows = jnp.swapaxes(columns, 0, 1).astype(float)
+    return rows @ jnp.swapaxes(rows, 1, 2)
 
 
-def dense(columns: Sequence[Any], slots: tuple[tuple[int, ...], ...]) -> tuple[np.ndarray, np.ndarray]:
+def dense(columns: np.ndarray, slots: tuple[tuple[int, ...], ...]) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian (pixels, channels, parameters) and residual (pixels, channels) in float64; `slots` as for `normal_equations`."""
-    *derivatives, residual = (np.asarray(column, float).T for column in columns)
+    *derivatives, residual = np.asarray(columns, float).swapaxes(1, 2)
     jacobian = np.zeros((*residual.shape, sum(len(at) for at in slots)))
     for derivative, at in zip(derivatives, slots, strict=True):
         for channel in range(residual.shape[1]):
@@ -63,7 +64,7 @@ def dense(columns: Sequence[Any], slots: tuple[tuple[int, ...], ...]) -> tuple[n
     return jacobian, residual
 
 
-def normal_equations(products: Float[Array, "c k k"] | np.ndarray, slots: tuple[tuple[int, ...], ...]) -> Normal:
+def normal_equations(products: Float[Array, "c k k"], slots: tuple[tuple[int, ...], ...]) -> Normal:
     """Half the sum of squares, its gradient and J^T J; `slots` are the places of each field's entries in the vector of parameters."""
     channels = len(products)
     size = sum(len(s) for s in slots)
@@ -165,6 +166,42 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
 
     def postprocess(self, fn, y, aux, args, options, state, tags, result):
         return y, aux, {}
+
+
+SOLVER = NormalLevenbergMarquardt()
+"""That of every fit."""
+
+LONGEST = 64
+"""Steps that are taken at once, at most."""
+
+
+def descend(
+    solver: NormalLevenbergMarquardt,
+    evaluate: Callable[[Any, Any], tuple[Normal, Any]],
+    y: Float[Array, " n"],
+    state: Any,
+    bounds: tuple[Any, Any],
+    most: Any,
+    kept: Any,
+) -> tuple[Any, Any, Array, Any]:
+    """At most `most` steps from `y`: the new point and state, the loss after each step (NaN where none was taken), and what was kept.
+
+    `evaluate` maps a point, and what was kept of the one before it, to the normal equations there and what is kept of this one.
+    """
+
+    def goes_on(at: Any) -> Any:
+        k, _, state, _, _ = at
+        return (k < most) & ~state.done
+
+    def step(at: Any) -> Any:
+        k, y, state, losses, kept = at
+        normal, kept = evaluate(state.y_eval, kept)
+        options = {"lower": bounds[0], "upper": bounds[1]}
+        y, state, _ = solver.step(lambda y, args: normal, y, None, options, state, frozenset())
+        return k + 1, y, state, losses.at[k].set(state.loss), kept
+
+    at = (0, y, state, jnp.full(LONGEST, jnp.nan), kept)
+    return lax.while_loop(goes_on, step, at)[1:]
 
 
 @functools.cache

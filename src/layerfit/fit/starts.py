@@ -5,7 +5,7 @@ taken a few steps. Those that have come to one place are one minimum; the best o
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -47,8 +47,8 @@ class Minimum:
     """Cost over that of the best minimum, with the same weights."""
 
 
-Descend = Callable[[Minimum, int, str], Minimum]
-"""Follow a point for at most so many steps, in a stage of that name."""
+Descend = Callable[[Sequence[Minimum], str], Iterable[Minimum]]
+"""Follow points side by side, in a stage of that name: "coarse" for a few steps, "polish" to the end."""
 
 
 def space_filling(free: Parametrisation, count: int, seed: int) -> list[np.ndarray]:
@@ -79,11 +79,11 @@ def _plausible(scale: str, lower: float, upper: float) -> tuple[float, float]:
 def search(points: Sequence[np.ndarray], descend: Descend, level: float, progress: Callable[[float], None]) -> list[Minimum]:
     """Minima that the points lead to, best first; `level` is the cost below which no two images are told apart."""
     found = []
-    for k, point in enumerate(points):
-        found.append(descend(Minimum((k,), point, np.inf, np.eye(len(point))), COARSE_STEPS, "coarse"))
-        progress((k + 1) / len(points))
+    for minimum in descend([Minimum((k,), point, np.inf, np.eye(len(point))) for k, point in enumerate(points)], "coarse"):
+        found.append(minimum)
+        progress(len(found) / len(points))
     places = distinct(found, level)
-    ends = [dataclasses.replace(descend(place, FINE_STEPS, "polish"), ended=True) for place in places[:FOLLOWED]]
+    ends = [dataclasses.replace(end, ended=True) for end in descend(places[:FOLLOWED], "polish")]
     return ranked(distinct([*ends, *places[FOLLOWED:]], level), level)
 
 

@@ -25,6 +25,7 @@ from .glsl import (
     bracketed,
     glsl_type,
     lift,
+    literal,
     reads,
     wider,
 )
@@ -135,6 +136,11 @@ def _integer_power(body: Any, eqn: Any, a: Value) -> Value:
     return Value(product, a.type, PRODUCT if y > 1 else ATOM, a.reads)
 
 
+def _power(body: Any, eqn: Any, a: Value) -> Value:
+    exponent = Value(literal(eqn.params["exponent"]), "float")
+    return _function("pow", lifted=True)(body, eqn, a, exponent)
+
+
 def _clamp(body: Any, eqn: Any, low: Value, x: Value, high: Value) -> Value:
     kind = wider(low, x, high)
     low, x, high = (lift(v, kind) for v in (low, x, high))
@@ -156,6 +162,7 @@ PRIMITIVES: dict[str, Callable[..., Value]] = {
     **{name: _function(name) for name in ("exp", "exp2", "log", "sqrt", "sin", "cos", "tan", "abs", "sign", "floor", "ceil")},
     "rsqrt": _function("inversesqrt"),
     **{name: _helper(name) for name in ("erf", "expm1", "log1p", "atan2")},
+    "power": _power,
     "integer_pow": _integer_power,
     "square": _integer_power,
     "clamp": _clamp,

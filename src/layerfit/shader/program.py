@@ -28,6 +28,9 @@ ELEMENTWISE = frozenset(
 SAID_OTHERWISE = {"lt_to": "lt", "le_to": "le"}
 """What JAX has further names for: these order NaN too, which a program does not meet."""
 
+POWERS = {"integer_pow": "y", "power": "exponent"}
+"""Powers with constant exponents, and the parameter that has them."""
+
 UNCHANGED = ("convert_element_type", "copy", "expand_dims", "reshape", "squeeze")
 """What changes neither numbers nor their order."""
 
@@ -120,8 +123,8 @@ class _Program:
             return [self.constant(eqn.primitive.bind(*(self.value(place) for place in operands), **p))]
         if kind in UNCHANGED:
             return [Place(operands[0].index, shape)]
-        if kind == "integer_pow":
-            return [self.step("pow", shape, [*operands, self.constant(np.full(shape, p["y"]))])]
+        if kind in POWERS:
+            return [self.step("pow", shape, [*operands, self.constant(np.full(shape, p[POWERS[kind]], float))])]
         kind = SAID_OTHERWISE.get(kind, kind)
         if kind == "div" and np.issubdtype(eqn.outvars[0].aval.dtype, np.integer):
             kind = "whole_div"

@@ -12,11 +12,10 @@ from scipy.optimize import least_squares
 
 from ..capture.load import AnyView
 from ..capture.measured.sphere import bare_sphere
-from ..fit.blocks import Block, arrange, channels_first, stratified
+from ..fit.blocks import arrange, stratified, weighted
 from ..fit.fit import fit
-from ..fit.parameters import Parametrisation, parametrise
-from ..fit.residuals import initial, rows, scaled, step
-from ..fit.solve import NormalLevenbergMarquardt
+from ..fit.parameters import parametrise
+from ..fit.residuals import Residuals, initial, scaled
 from ..fit.starts import space_filling
 from ..fit.weights import inverse_sigma
 from ..render import predict
@@ -124,41 +123,36 @@ def _solved(task: Task, solver: str, precision: str) -> dict[str, Any]:
         start = start.astype(dtype)
         views = [thinned(view, max(32, SOLVER_PIXELS // len(task.views))) for view in task.views]
         samples = [view.samples() for view in views]
-        blocks, layout = arrange(samples, None, 0, start.needs)
+        blocks, layout = arrange(samples, 0, start.needs)
         weights = [inverse_sigma(s.target, s.target, None, "law") for s in samples]
-        even = channels_first(layout.scatter(weights, 0.0))
-        weighed = [dataclasses.replace(block, inverse_sigma=w) for block, w in zip(blocks, even, strict=True)]
-        cast = [jax.tree.map(lambda a: np.asarray(a, dtype), block) for block in weighed]
+        cast = jax.tree.map(lambda a: a.astype(dtype) if a.dtype == np.float32 else a, weighted(blocks, layout, weights))
+        residuals = Residuals(start, named, None, cast, len(layout.pixel))
         descend = _own if solver == "layerfit" else _scipy
-        descend(solver, start, cast, named)
+        descend(solver, residuals)
         began = time.perf_counter()
-        vector, steps = descend(solver, start, cast, named)
+        vector, steps = descend(solver, residuals)
         seconds = time.perf_counter() - began
         found = named.put(start, named.fields(vector), np)
     return _row("solver", sum(len(s.index) for s in samples), 1, solver, precision, seconds, steps, task.error(found))
 
 
-def _own(solver: str, start: Stack, blocks: Sequence[Block], free: Parametrisation) -> tuple[np.ndarray, int]:
-    method, u = NormalLevenbergMarquardt(), free.pack(start)
-    state = initial(u, method)
-    for k in range(STEPS):
-        u, state = step(u, state, free.bounds(), start, blocks, free=free, solver=method)
-        if bool(state.done):
-            return np.asarray(u), k + 1
-    return np.asarray(u), STEPS
+def _own(solver: str, residuals: Residuals) -> tuple[np.ndarray, int]:
+    u = residuals.free.pack(residuals.start)
+    u, _, losses = residuals.steps(u, initial(u), residuals.free.bounds(), most=STEPS)
+    return np.asarray(u), int(np.sum(~np.isnan(losses)))
 
 
-def _scipy(solver: str, start: Stack, blocks: Sequence[Block], free: Parametrisation) -> tuple[np.ndarray, int]:
+def _scipy(solver: str, residuals: Residuals) -> tuple[np.ndarray, int]:
     kept: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
 
     def both(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if u.tobytes() not in kept:
             kept.clear()
-            kept[u.tobytes()] = rows(u, start, blocks, free=free)
+            kept[u.tobytes()] = residuals.rows(u)
         return kept[u.tobytes()]
 
-    lower, upper = free.bounds()
-    first = np.clip(free.pack(start), lower + 1e-6 * (upper - lower), upper - 1e-6 * (upper - lower))
+    lower, upper = residuals.free.bounds()
+    first = np.clip(residuals.free.pack(residuals.start), lower + 1e-6 * (upper - lower), upper - 1e-6 * (upper - lower))
     solve: Any = least_squares  # its stub knows no function for `jac`
     found = solve(
         lambda u: both(u)[1].ravel(),
