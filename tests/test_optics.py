@@ -7,6 +7,7 @@ import pytest
 from scipy import integrate
 
 from helpers import FLOOR, REL, cases, close
+from layerfit._chunk import safe_power
 from layerfit.optics.fresnel import (
     conductor_f0,
     dielectric_f0,
@@ -247,3 +248,19 @@ def test_fresnel_and_its_derivatives_are_finite(dtype, c, eta):
         value, slopes = jax.value_and_grad(fn, (0, 1))(jnp.asarray(c, dtype), jnp.asarray(eta, dtype))
         assert 0.0 <= float(value) <= 1.0 + 1e-6
         assert np.all(np.isfinite(slopes))
+
+
+@pytest.mark.parametrize("exponent", [1.34, 0.5, 3.16])
+def test_powers_of_float32_are_those_of_float64(exponent):
+    """Made of an exponential and a logarithm, whose errors grow with the logarithm."""
+    x = np.geomspace(1e-20, 30.0, 4000).astype(np.float32)
+    narrow, slopes = jax.jvp(jax.jit(lambda x: safe_power(x, exponent)), (x,), (np.ones_like(x),))
+    wide = x.astype(float) ** exponent
+    seen = wide > 1e-30
+    log = np.abs(exponent * np.log(x.astype(float)))
+    assert narrow.dtype == np.float32
+    assert np.all(np.abs(narrow / wide - 1.0)[seen] < (1.2e-7 * (2.0 + log))[seen])
+    np.testing.assert_allclose(slopes[seen], (exponent * wide / x)[seen], rtol=2e-5)
+    np.testing.assert_array_equal(jax.vmap(lambda x: safe_power(x, exponent))(x), safe_power(x, exponent))
+    np.testing.assert_allclose(safe_power(x.astype(float), exponent), wide, rtol=1e-14)
+    np.testing.assert_array_equal(safe_power(jnp.array([0.0, -1.0]), exponent) < 1e-14, True)

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from layerfit.fit.residuals import initial
-from layerfit.fit.solve import NormalLevenbergMarquardt, columns, dense, normal_equations, products, tangents
+from layerfit.fit.solve import NormalLevenbergMarquardt, columns, dense, descend, normal_equations, products, tangents
 from layerfit.fit.uncertainty import GROUPS, estimate
 
 SLOTS = ((0,), (1, 2, 3), (4,))
@@ -132,6 +132,27 @@ def test_a_step_that_the_bounds_turn_uphill_is_shortened():
     assert state.done
     assert np.all(np.diff(losses) <= 0.0), "a step uphill was taken"
     np.testing.assert_allclose(y, [0.0, 3.5 - 0.99 * 3.0], atol=1e-4)  # on the bound, and where the slope along it ends
+
+
+def test_a_descent_is_the_same_steps_in_one_call():
+    start, target = [0.3, 1.0, 1.0, 1.0, 1.0], jnp.asarray(TARGET)
+    bounds = np.full(5, -np.inf), np.full(5, np.inf)
+
+    def evaluate(u, kept):
+        return normal_equations(products(jacobian(u, target, residual)), SLOTS), kept + 1
+
+    y = jnp.array(start)
+    whole, state, losses, evaluations = descend(SOLVER, evaluate, y, initial(y), bounds, 40, 0)
+    stepped, ended, path = minimise(start)
+    taken = int(np.sum(~np.isnan(losses)))
+    assert taken == evaluations == len(path)
+    assert state.done
+    np.testing.assert_allclose(whole, stepped, rtol=1e-10)
+    assert losses[taken - 1] == pytest.approx(float(ended.loss), rel=1e-12)
+    cut, state, losses, _ = descend(SOLVER, evaluate, y, initial(y), bounds, 3, 0)
+    assert not state.done
+    np.testing.assert_allclose(cut, path[2], rtol=1e-10)
+    assert np.sum(~np.isnan(losses)) == 3
 
 
 def test_units_of_the_parameters_do_not_matter():

@@ -20,8 +20,12 @@ VALLEYS = {0.0: 1.0, 5.0: 1.2, -5.0: 3.0}
 """Bottoms of a landscape of three parabolas, with their costs."""
 
 
-def descend(at, most, stage):
+def descend(at, stage):
     """Half of the way to the nearest bottom in a few steps, all of it in many."""
+    return (downhill(point, stage) for point in at)
+
+
+def downhill(at, stage):
     bottom = min(VALLEYS, key=lambda b: abs(b - at.vector[0]))
     u = bottom + (at.vector - bottom) * (0.5 if stage == "coarse" else 0.0)
     return dataclasses.replace(at, vector=u, cost=VALLEYS[bottom] + float((u[0] - bottom) ** 2), gram=np.array([[2.0]]))

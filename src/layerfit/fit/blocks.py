@@ -119,8 +119,9 @@ def arrange(references: list[Samples], seed: int, needs: tuple[str, ...] = ()) -
     target = channels_first(layout.scatter([s.target for s in references], 0.0))
     where = {name: layout.scatter([getattr(s.place, name) for s in references], 0.0) for name in needs}
     of = np.array([k for k, _ in rows], np.int32)
-    arrays = (held(a) for a in (wi, wo, weight, target, np.zeros_like(target), of))
-    return Blocks(*arrays, Place(**{name: held(values) for name, values in where.items()}) if where else None), layout
+    place = Place(**{name: held(values) for name, values in where.items()}) if where else None
+    even = held(np.zeros_like(target))
+    return Blocks(held(wi), held(wo), held(weight), held(target), even, held(of), place), layout
 
 
 def weighted(blocks: Blocks, layout: Layout, weights: list[np.ndarray]) -> Blocks:
