@@ -79,10 +79,11 @@ class Problem:
             values = self.weights(models, self.metric)
             self._give_back(models)
         self.blocks = weighted(self.blocks, self.layout, values)
+        # By NumPy: so small a thing is not worth a compiler's time.
         weight, target, by = jax.tree.map(
-            lambda a: a[: self.count], (self.blocks.inverse_sigma, self.blocks.target, self.blocks.curve)
+            lambda a: np.asarray(a)[: self.count], (self.blocks.inverse_sigma, self.blocks.target, self.blocks.curve)
         )
-        self.brightness = np.sum(np.square(np.asarray(weight * compared(target, by)), dtype=float), (1, 2))
+        self.brightness = np.sum(np.square(weight * compared(target, by), dtype=float), (1, 2))
 
     def _give_back(self, models: Sequence[np.ndarray]) -> None:
         """Set the targets to what the references are without fireflies, but for their light: that is everywhere."""

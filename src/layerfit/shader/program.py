@@ -119,7 +119,8 @@ class _Program:
         if kind == "unstack":
             return [self.view(operands[0], row) for row in _rows(p["axis"], len(eqn.outvars))]
         shape = eqn.outvars[0].aval.shape
-        if all(place.index in self.known for place in operands):
+        # A constant that is spread over an array is a view of it: JAX would compile a function for each shape.
+        if kind != "broadcast_in_dim" and all(place.index in self.known for place in operands):
             return [self.constant(eqn.primitive.bind(*(self.value(place) for place in operands), **p))]
         if kind in UNCHANGED:
             return [Place(operands[0].index, shape)]
