@@ -371,6 +371,15 @@ def test_a_closed_pipe_is_no_fault(scene):
         assert ran.stderr.read() == b""
 
 
+@pytest.mark.parametrize("arguments", [["presets", "wood"], ["presets", "wood", "--json"]])
+def test_standard_output_on_a_full_disk_is_said(arguments):
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "layerfit", *arguments]
+        ran = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert ran.returncode == 2
+    assert ran.stderr == ("layerfit: standard output: cannot be written: No space left on device. Send it to another place.\n")
+
+
 def test_light_from_everywhere_is_reported_as_a_quadrature(scene, gl, tmp_path, monkeypatch):
     monkeypatch.setattr(importlib.import_module("layerfit.fit.pixels"), "EVALUATIONS", 128 * 496)
     monkeypatch.setattr("layerfit.job.PICTURE_SAMPLES", 1)

@@ -472,14 +472,14 @@ def test_write_errors_say_where(tmp_path: Path):
     channels = {"R": pixels()}
     with pytest.raises(InputError, match="no is not a folder; create it"):
         write_exr(tmp_path / "no" / "x.exr", channels)
-    with pytest.raises(InputError, match=r"cannot be written \(Is a directory\)"):
+    with pytest.raises(InputError, match="cannot be written: Is a directory"):
         write_exr(tmp_path, channels)
     locked = tmp_path / "locked"
     locked.mkdir(mode=0o555)
     for folder in (tmp_path, *tmp_path.parents):  # pytest closes its folders to others; those above are not its own
         if folder == tmp_path or folder.name.startswith(("pytest-", "popen-")):
             folder.chmod(0o755)
-    with unprivileged(), pytest.raises(InputError, match=r"x\.exr: cannot be written \(.*\); choose another folder"):
+    with unprivileged(), pytest.raises(InputError, match=r"x\.exr: cannot be written: Permission denied.*choose another"):
         write_exr(locked / "x.exr", channels)
     assert list(locked.iterdir()) == []
 

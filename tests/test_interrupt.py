@@ -1,13 +1,12 @@
 """Ctrl-C: said, exit code 130, and nothing half written."""
 
-import os
 import subprocess
 import sys
 
 import pytest
+from interrupts import Trial, interrupt, whole
 
 from commands import layerfit, snapshot, write_reference
-from layerfit.preset import read_preset
 
 
 @pytest.fixture(scope="module")
@@ -30,29 +29,54 @@ def test_an_interrupt_is_said(scene, gl, tmp_path, monkeypatch):
 CONTROL_C = """
 import os, signal, sys
 from pathlib import Path
-import layerfit.documents as documents
-from layerfit.cli import main
+from layerfit import documents
+from layerfit.__main__ import _interrupted
 
-during, replace = sys.argv.pop(1), os.replace
+link = os.link
 
-def interrupted(old, new):
-    if Path(new).name == during:
+def interrupted(old, new, **options):
+    link(old, new, **options)
+    if Path(new).name == sys.argv[2]:
         os.kill(os.getpid(), signal.SIGINT)
-    replace(old, new)
 
-documents.os.replace = interrupted
-main()
+documents.os.link = interrupted
+signal.signal(signal.SIGINT, _interrupted)
+documents.write_files(Path(sys.argv[1]), dict.fromkeys("abc", "new"))
+print("it went on")
 """
-"""A fit that gets the signal of Ctrl-C while it writes a file."""
+"""A program that gets the signal of Ctrl-C while it names its files."""
 
 
-def test_an_interrupt_while_files_are_written_leaves_whole_ones(scene, gl, tmp_path):
-    arguments = [sys.executable, "-c", CONTROL_C, "report.html", "fit", scene, "-o", tmp_path / "out", "--starts", "1"]
-    environment = {**os.environ, "LAYERFIT_NO_CACHE": "1"}
-    ran = subprocess.run(arguments, capture_output=True, text=True, check=False, env=environment)
+@pytest.mark.parametrize("during", ["a", "c"])
+def test_an_interrupt_while_files_are_named_leaves_all_of_them(during, tmp_path):
+    arguments = [sys.executable, "-c", CONTROL_C, tmp_path, during]
+    ran = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout) == (130, ""), ran.stderr
-    assert "interrupted; every file that was written is whole" in ran.stderr
-    assert "Traceback" not in ran.stderr
-    there = snapshot(tmp_path / "out")
-    assert set(there) == {"material.frag", "trace.csv", "fit.png", "preset.json"}, "half written, or after the interrupt"
-    assert read_preset(tmp_path / "out" / "preset.json").layers[0].name == "coat"
+    assert ran.stderr == "layerfit: interrupted; every file that was written is whole\n"
+    assert snapshot(tmp_path) == dict.fromkeys("abc", b"new")
+
+
+def test_random_moments(tmp_path):
+    """A few; `python tools/interrupts.py` tries more, of commands that take longer."""
+    trial = Trial("gallery", tmp_path)
+    assert trial.names == {"index.html"}
+    assert [*interrupt(trial, count=4, seed=0)] == []
+
+
+HALF = {
+    "a.json": b'{"a": 1',
+    "a.jsonl": b'{"a": 1}\n{"b',
+    "a.csv": b"a,b\n1,2\n3\n",
+    "a.png": b"\x89PNG\r\n\x1a\n",
+    "a.html": b"<html><body>",
+    "a.frag": b"#version 330 core\nvoid main() {",
+    "a.md": b"# A",
+    "a.parquet": b"PAR1",
+    ".a.json": b"{}",
+    "a.part": b"",
+}
+
+
+@pytest.mark.parametrize("name", HALF)
+def test_half_files_are_seen(name):
+    assert whole(name, HALF[name])

@@ -1,13 +1,19 @@
 """Documents that users write and read: TOML and JSON in, whole files out."""
 
+import contextlib
 import difflib
+import errno
+import fcntl
 import json
 import math
 import os
+import signal
 import sys
 import tempfile
+import threading
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+import uuid
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -70,26 +76,79 @@ def check_keys(document: Any, known: Sequence[str], where: str) -> None:
             raise InputError(f"{where}: unknown key {key!r}{nearest(str(key), known)}. Known keys: {', '.join(known)}")
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: to a temporary name beside it, then renamed."""
+@contextlib.contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Where to write a file that is to be there whole or not at all: it takes its name when the block ends well.
+
+    Until then it has no name, so that a process that is killed leaves nothing behind; where the file system cannot do that, a hidden
+    one. What is no file, as a pipe or `/dev/stdout`, is written straight. Raises `InputError` where the file cannot be written.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        yield path
+        return
+    hidden = path.with_name(f".{uuid.uuid4().hex}{path.suffix[:9]}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        descriptor = _nameless(path.parent)
+        if descriptor is None:
+            yield hidden
+            os.replace(hidden, path)
+        else:
+            with os.fdopen(descriptor, "wb"):
+                yield Path(f"/proc/self/fd/{descriptor}")
+                with undisturbed():
+                    _name(descriptor, path, hidden)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}. Choose another output path.") from None
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
-    except OSError as error:
-        Path(temporary).unlink(missing_ok=True)
         raise InputError(
             f"{path}: cannot be written: {error.strerror}. It was left as it was; choose another output path."
         ) from None
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+    finally:
+        with contextlib.suppress(OSError):
+            hidden.unlink(missing_ok=True)
+
+
+def _nameless(directory: Path) -> int | None:
+    """A descriptor of a new file without a name; None where the file system has none, or nothing to name it by later."""
+    if not Path("/proc/self/fd").is_dir():
+        return None
+    try:
+        return os.open(directory, os.O_TMPFILE | os.O_WRONLY, 0o666)
+    except OSError as error:
+        if error.errno in (errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL):
+            return None
         raise
+
+
+def _name(descriptor: int, path: Path, hidden: Path) -> None:
+    """Give a file without a name its name; by way of another one where something stands there, which a link does not replace."""
+    place = f"/proc/self/fd/{descriptor}"
+    try:
+        os.link(place, path, src_dir_fd=descriptor)  # with a descriptor, what the place leads to is linked
+    except FileExistsError:
+        os.link(place, hidden, src_dir_fd=descriptor)
+        os.replace(hidden, path)
+
+
+@contextlib.contextmanager
+def undisturbed() -> Iterator[None]:
+    """Ctrl-C waits for the end of what takes no time."""
+    if threading.current_thread() is not threading.main_thread():  # signals are for the main one
+        yield
+        return
+    came: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if came:
+            signal.raise_signal(signal.SIGINT)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all."""
+    with whole(path) as place:
+        place.write_bytes(content)
 
 
 def write_text(path: Path, content: str) -> None:
@@ -97,10 +156,32 @@ def write_text(path: Path, content: str) -> None:
     write_bytes(path, content.encode())
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def write_files(directory: Path, contents: Mapping[str, str | bytes]) -> None:
+    """Write the files of one result, by their names in a directory: all of them, or none where one cannot be written.
+
+    They take their names in this order, at once when all are written, and those of two processes one after the other: what stands in
+    the directory is of one result.
+    """
+    with one_writer(directory), undisturbed(), contextlib.ExitStack() as files:
+        for name, content in reversed(list(contents.items())):  # what is entered last leaves first
+            place = files.enter_context(whole(directory / name))
+            place.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+@contextlib.contextmanager
+def one_writer(directory: Path) -> Iterator[None]:
+    """Make a directory, and wait until no other process writes to it. What is held is given back when the process ends, in whatever way."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        held = os.open(directory, os.O_RDONLY)
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be written to: {error.strerror}. Choose another output directory.") from None
+    try:
+        with contextlib.suppress(OSError):  # file systems of a network may have no locks: there the last one wins, file by file
+            fcntl.flock(held, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(held)
 
 
 def check_directory(path: Path) -> None:

@@ -17,7 +17,7 @@ from .capture.measured.sphere import sphere_of
 from .capture.measured.view import MeasuredView
 from .capture.samples import QUADRATURE, Samples, View
 from .capture.scene import Scene, read_scene
-from .documents import check_directory, finite, write_bytes, write_text
+from .documents import check_directory, finite, write_bytes, write_files
 from .errors import InputError
 from .fit.advise import advise
 from .fit.fit import fit
@@ -121,17 +121,18 @@ def fit_scene(
         "noise": [view.noise is not None for view in result.views],
     }
     document["quadrature"] = quadrature
-    write_text(directory / "material.frag", shader.text())
-    write_text(directory / "trace.csv", _trace(result))
-    write_bytes(directory / "fit.png", picture)
     in_planes = _planes(result, name)
-    if in_planes is not None:
-        write_bytes(directory / "planes.png", in_planes)
-    write_text(directory / "preset.json", json.dumps(preset_of(result.stack, name, fit=_summary(document)), indent=2) + "\n")
     trace = [(row.time_s, row.stage, row.start, row.error) for row in result.trace]
-    report = html.page(name, document, pairs, picture, trace, shader.text(), live, in_planes)
-    write_text(directory / "report.html", report)
-    write_text(directory / "fit.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
+    files = {
+        "material.frag": shader.text(),
+        "trace.csv": _trace(result),
+        "fit.png": picture,
+        **({} if in_planes is None else {"planes.png": in_planes}),
+        "preset.json": json.dumps(preset_of(result.stack, name, fit=_summary(document)), indent=2) + "\n",
+        "report.html": html.page(name, document, pairs, picture, trace, shader.text(), live, in_planes),
+        "fit.json": json.dumps(document, indent=2, allow_nan=False) + "\n",
+    }
+    write_files(directory, files)
     return Outcome(document, directory, result.converged and parity.passed)
 
 
@@ -343,8 +344,8 @@ def write_advice(scene: Scene, stack: Stack | None, directory: Path | None, prog
     found = advise(scene, stack, progress=progress)
     document = advice.document(found)
     if directory is not None:
-        write_bytes(directory / "advice.png", advice.light_map(found.candidates))
-        write_text(directory / "advice.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
+        text = json.dumps(document, indent=2, allow_nan=False) + "\n"
+        write_files(directory, {"advice.png": advice.light_map(found.candidates), "advice.json": text})
     return document
 
 

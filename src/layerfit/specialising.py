@@ -11,7 +11,7 @@ import numpy as np
 
 from .capture.load import load
 from .capture.scene import FitRequest, Scene, read_scene
-from .documents import check_directory, finite, write_text
+from .documents import check_directory, finite, write_files
 from .errors import InputError
 from .fit.fit import fit
 from .fit.parameters import known_parameters, with_fixed
@@ -100,12 +100,13 @@ def specialise(
     )
     document["in_words"] = report.sentences(document)
     record = {"scene": str(read.path), "tolerance": tolerance, "removed": [row for row in rows if row["removed"]]}
-    write_text(directory / "material.frag", print_material(found.stack, name).text())
-    write_text(
-        directory / "preset.json", json.dumps(preset_of(found.stack, name, fit={"specialised": record}), indent=2) + "\n"
-    )
-    write_text(directory / "specialise.html", report.page(document))
-    write_text(directory / "specialise.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
+    files = {
+        "material.frag": print_material(found.stack, name).text(),
+        "preset.json": json.dumps(preset_of(found.stack, name, fit={"specialised": record}), indent=2) + "\n",
+        "specialise.html": report.page(document),
+        "specialise.json": json.dumps(document, indent=2, allow_nan=False) + "\n",
+    }
+    write_files(directory, files)
     kept.done()
     return Told(document, report.table(document), *document["in_words"])
 

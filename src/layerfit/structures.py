@@ -9,7 +9,7 @@ from typing import Any
 from .capture.load import load
 from .capture.measured.read import is_measured
 from .capture.scene import FitRequest, MeasuredReference, Scene, read_scene
-from .documents import check_directory, write_bytes, write_text
+from .documents import check_directory, write_files
 from .fit.structures import choose_structure
 from .forms.corrected import Corrected
 from .job import Outcome, Progress, fit_scene
@@ -63,8 +63,8 @@ def structures_of(
     request = dataclasses.replace(scene.fit, free=found.candidate.free, fixed={}, metric=metric, seed=seed)
     outcome = fit_scene(dataclasses.replace(scene, start=found.result.stack, fit=request), directory, progress=progress)
     document = report.document(choice)
-    write_bytes(directory / "structures.png", report.pareto(choice))
-    write_text(directory / "structures.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
+    text = json.dumps(document, indent=2, allow_nan=False) + "\n"
+    write_files(directory, {"structures.png": report.pareto(choice), "structures.json": text})
     return StructuresOutcome(document, outcome)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from . import truth
 from .capture.load import AnyView, load
 from .capture.scene import Scene, read_scene
-from .documents import check_directory, write_bytes, write_text
+from .documents import check_directory, write_files
 from .errors import InputError
 from .fit.words import structure
 from .preset import model_name, preset_of, read_preset
@@ -81,11 +81,14 @@ def tradeoff(
         "fits": _fits(stack, read, views, kept, progress) if fit else [],
     }
     document["in_words"] = report.sentences(document)
-    write_text(directory / "tradeoff.csv", _csv(document["tiers"]))
     picture = report.picture(document)
-    write_bytes(directory / "tradeoff.png", picture)
-    write_text(directory / "tradeoff.html", report.page(document, picture))
-    write_text(directory / "tradeoff.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
+    files = {
+        "tradeoff.csv": _csv(document["tiers"]),
+        "tradeoff.png": picture,
+        "tradeoff.html": report.page(document, picture),
+        "tradeoff.json": json.dumps(document, indent=2, allow_nan=False) + "\n",
+    }
+    write_files(directory, files)
     kept.done()
     return Told(document, *report.tables(document), *document["in_words"])
 

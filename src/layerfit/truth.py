@@ -13,7 +13,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from .documents import check_directory, finite, nearest, write_bytes, write_text
+from .documents import check_directory, finite, nearest, write_files
 from .errors import InputError
 from .fit.words import structure
 from .preset import MODELS, model_name
@@ -124,9 +124,9 @@ def compare(
 
 
 def write_truth(document: dict[str, Any], directory: Path) -> None:
-    """Leave `truth.png` and `truth.json` in a directory, each whole or not at all."""
-    write_bytes(directory / "truth.png", report.curves(document))
-    write_text(directory / "truth.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
+    """Leave `truth.png` and `truth.json` in a directory, both or none."""
+    text = json.dumps(document, indent=2, allow_nan=False) + "\n"
+    write_files(directory, {"truth.png": report.curves(document), "truth.json": text})
 
 
 def truth_of_preset(stack: Stack, name: str, directory: Path, **options: Any) -> Told:

@@ -1,7 +1,9 @@
 """Fits of a batch, one after the other or shared among processes."""
 
 import multiprocessing
+import os
 import signal
+import threading
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
@@ -55,4 +57,13 @@ def _shared(pool: Executor, left: dict[str, Task], tries: dict[str, int], worker
 
 def _begin_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is for the process that shares out the work
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     use_compilation_cache()
+
+
+def _end_with_parent() -> None:
+    """A killed batch leaves no workers that wait for it."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -11,7 +11,6 @@ import os
 import sys
 import tempfile
 import threading
-import uuid
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 import OpenEXR
 
+from ..documents import whole
 from ..errors import InputError
 from .layout import Window, read_layout, shape
 
@@ -124,20 +124,17 @@ def write_exr(
     attributes |= {key: np.asarray(v, np.float32) if isinstance(v, list) else v for key, v in (header or {}).items()}
     if not path.parent.is_dir():
         raise InputError(f"{path}: cannot be written, {path.parent} is not a folder; create it or choose another one")
-    partial = path.with_name(f".{uuid.uuid4().hex}.exr")
-    try:
+    with whole(path) as place:
         with _captured() as said:
             try:
-                OpenEXR.File(attributes, pixels).write(str(partial))
+                OpenEXR.File(attributes, pixels).write(str(place))
             except RuntimeError as error:
-                reason = _one_line(f"{error}; {said()}")
+                reason = _one_line(f"{error}; {said()}".replace(str(place), path.name))
                 raise InputError(f"{path}: cannot be written ({reason}); choose another folder") from None
-        read_layout(partial)  # a full disk leaves blocks out
-        os.replace(partial, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another name or folder") from None
-    finally:
-        partial.unlink(missing_ok=True)
+        try:
+            read_layout(place)
+        except InputError:  # a full disk leaves blocks out, and the library says nothing
+            raise InputError(f"{path}: cannot be written whole (is the disk full?); choose another folder") from None
 
 
 def _to_half(values: np.ndarray) -> np.ndarray:

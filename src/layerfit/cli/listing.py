@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from .app import Output, command
-from .talk import Done, manner, progress, say, stdout, tell
+from .talk import Done, progress, say, tell, tell_table
 
 
 @command()
@@ -99,8 +99,7 @@ def inspect(
     from ..capture.inspect import inspect as inspect_file
 
     found = inspect_file(file)
-    if not manner.json:
-        stdout.print(found.render())
+    tell_table(found.render())
     measured = file.suffix.lower() != ".exr"
     good = not any(finding.severity == "warning" for finding in found.findings)
     return Done(found.to_json(), ("structures", file) if measured else ("fit", file.with_suffix(".toml")), good)

@@ -5,6 +5,7 @@ or the machine is at fault, with a message that says what to do.
 """
 
 import dataclasses
+import io
 import json
 import os
 import shlex
@@ -14,13 +15,15 @@ from typing import Any
 
 from rich.console import Console
 
+from ..errors import InputError
+
 STARTED = time.perf_counter()
 
-PLAIN = bool(os.environ.get("NO_COLOR"))
-"""No styles at all, as <https://no-color.org> asks; where the output is not a terminal there are none anyway."""
+COLOURS = None if os.environ.get("NO_COLOR") else "auto"
+"""None: no styles at all, as <https://no-color.org> asks; where the output is not a terminal there are none anyway."""
 
-stdout = Console(highlight=False, color_system=None if PLAIN else "auto")
-stderr = Console(stderr=True, highlight=False, color_system=None if PLAIN else "auto")
+stdout = Console(highlight=False, color_system=COLOURS)
+stderr = Console(stderr=True, highlight=False, color_system=COLOURS)
 
 
 @dataclasses.dataclass
@@ -49,9 +52,7 @@ class Done:
 def finish(done: Done) -> int:
     """Print what is left to print; returns the exit code."""
     if manner.json and done.document is not None:
-        json.dump(done.document, sys.stdout, indent=2, allow_nan=False)
-        sys.stdout.write("\n")
-        sys.stdout.flush()
+        _put(json.dumps(done.document, indent=2, allow_nan=False) + "\n")
     detail(f"Done after {time.perf_counter() - STARTED:.2f} s")
     if done.then:
         say(f"Next: layerfit {shlex.join(map(str, done.then))}")
@@ -61,7 +62,28 @@ def finish(done: Done) -> int:
 def tell(text: str) -> None:
     """A result, on standard output; with `--json` the document stands in its place."""
     if not manner.json:
+        _put(text)
+
+
+def tell_table(table: Any) -> None:
+    """`tell` of what rich draws."""
+    text = io.StringIO()
+    Console(highlight=False, color_system=COLOURS, file=text, force_terminal=stdout.is_terminal, width=stdout.width).print(
+        table
+    )
+    tell(text.getvalue())
+
+
+def _put(text: str) -> None:
+    """Data on standard output. Raises `InputError` where that is a file on a full disk."""
+    try:
         sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads has read enough
+        raise
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left of it would be tried again at the exit
+        raise InputError(f"standard output: cannot be written: {error.strerror}. Send it to another place.") from None
 
 
 def say(text: str) -> None:
