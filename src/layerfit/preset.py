@@ -34,7 +34,7 @@ MOST_COATS = 8
 """Each is a function in the shader and a trace that grows."""
 FORM_KEYS = ("model", "interface", "options")
 _STACK_KEYS = (*FORM_KEYS, "layers", "base")
-_PRESET_KEYS = ("schema", "version", "name", *WORDS, *_STACK_KEYS, "left_out", "fit")
+_PRESET_KEYS = ("schema", "version", "name", *WORDS, *_STACK_KEYS, "left_out", "fit", "losses")
 
 
 def read_preset(path: Path | str) -> Stack:

@@ -23,6 +23,12 @@ def fit(
     seed: Seed = None,
     metric: Metric = None,
     loss: Loss = None,
+    start: Annotated[
+        Path | None,
+        typer.Option(
+            help="Material to start from in place of the scene's: .gltf, .glb, .mtlx, a preset, or Blender's inputs (.json)."
+        ),
+    ] = None,
     profile: Annotated[
         list[str] | None,
         typer.Option(
@@ -48,7 +54,7 @@ def fit(
     check_choice(metric, METRICS, "--metric")
     with progress() as report:
         outcome = fit_scene(
-            scene,
+            scene if start is None else _starting(scene, start),
             output,
             import_s=imported,
             progress=report,
@@ -60,6 +66,17 @@ def fit(
         )
     _show_fit(outcome)
     return Done(outcome.document, _after_fit(outcome.document["flags"], scene, output), outcome.good)
+
+
+def _starting(scene: Path, start: Path) -> Any:
+    """A scene whose fit starts from another material."""
+    import dataclasses
+
+    from ..capture.scene import read_scene
+    from ..interchange.formats import read_start
+
+    stack = read_start(start)
+    return dataclasses.replace(read_scene(scene, stack), start=stack)
 
 
 def _show_fit(outcome: Any) -> None:

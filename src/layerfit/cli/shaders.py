@@ -27,14 +27,35 @@ def export(
     max_cost: Annotated[
         float | None, typer.Option(help="Instructions in times of Phong: takes the nearest tier within.")
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Shader to write; left out, standard output.")] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(
+            help="Another program's material in place of the shader: mtlx, gltf, blender, three or babylon.",
+            autocompletion=complete.formats,
+        ),
+    ] = None,
+    scene: Annotated[
+        Path | None, typer.Option(help="With --to: scene file on whose references the loss is measured; left out, a sphere.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; left out, standard output.")] = None,
 ) -> Done:
-    """Print the shader of a preset.
+    """Print the shader of a preset; or, with `--to`, the material that another program comes nearest to it with.
+
+    Then the values are found that look most like it. What is lost is measured, said, and stored in the preset.
 
     Example: `layerfit export out/preset.json --target essl300 -o copper.frag`
+
+    Example: `layerfit export out/preset.json --to gltf -o copper.gltf`
     """
-    from ..documents import nearest, write_text
+    from ..documents import nearest
     from ..errors import InputError
+
+    if to is not None:
+        if uniforms or any(option is not None for option in (tier, max_error, max_cost)):
+            raise InputError("--uniforms, --tier, --max-error and --max-cost are of the shader: leave them out, or --to")
+        return _export_to(preset, to, scene, output)
+    if scene is not None:
+        raise InputError("--scene is for --to: a shader is the material, wherever it is seen")
     from ..preset import read_preset
     from ..shader.export import HEADERS, print_material
 
@@ -50,13 +71,34 @@ def export(
     else:
         shader, name = print_material(stack, preset.stem, uniforms), "exact"
     text = shader.text(target)
+    _write(text, output)
+    document = {"name": shader.name, "target": target, "tier": name, "shader": text}
+    return Done(document, ("verify", preset))
+
+
+def _export_to(preset: Path, to: str, scene: Path | None, output: Path | None) -> Done:
+    from ..cache import use_compilation_cache
+    from ..documents import check_directory
+    from ..interchange.formats import export_to, said
+
+    use_compilation_cache()
+    if output is not None:
+        check_directory(output.parent)  # before the preset is told
+    made = export_to(preset, to, scene)
+    for line in said(made, to):
+        say(line)
+    _write(made.text, output)
+    return Done(made.to_json() | {"to": to, "text": made.text}, ("view", preset))
+
+
+def _write(text: str, output: Path | None) -> None:
+    from ..documents import write_text
+
     if output is None:
         tell(text)
     else:
         write_text(output, text)
         say(f"Wrote {output}")
-    document = {"name": shader.name, "target": target, "tier": name, "shader": text}
-    return Done(document, ("verify", preset))
 
 
 def _tier(stack: Any, name: str, tier: str | None, max_error: float | None, max_cost: float | None) -> Any:

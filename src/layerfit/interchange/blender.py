@@ -1,0 +1,142 @@
+"""Blender: a Python script that makes the material with `bpy`, and the inputs of a Principled BSDF as they are read back."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..documents import is_number
+from ..errors import InputError
+from . import words
+from .convert import Conversion
+from .engine import Engine
+
+SCHEMA = "layerfit/principled"
+
+SCRIPT = '''\
+"""{name}: a material for Blender 4 and 5, written by layerfit. Run it in Blender's text editor, or
+
+    blender scene.blend --background --python {name}.py
+
+It makes the material and gives it to the active object, where there is one.
+"""
+
+import bpy
+
+INPUTS = {inputs}
+
+material = bpy.data.materials.get({quoted}) or bpy.data.materials.new({quoted})
+material.use_nodes = True
+nodes, links = material.node_tree.nodes, material.node_tree.links
+nodes.clear()
+shader = nodes.new("ShaderNodeBsdfPrincipled")
+output = nodes.new("ShaderNodeOutputMaterial")
+output.location.x = 400
+shader.distribution = "GGX"  # what the values are found for; MULTI_GGX is brighter where it is rough
+for name, value in INPUTS.items():
+    shader.inputs[name].default_value = (*value, 1.0) if isinstance(value, list) else value
+links.new(shader.outputs["BSDF"], output.inputs["Surface"])
+active = bpy.context.view_layer.objects.active
+if active is not None and hasattr(active.data, "materials"):
+    active.data.materials.clear()
+    active.data.materials.append(material)
+'''
+
+
+def write(found: Conversion) -> str:
+    """A script that makes the material."""
+    inputs = json.dumps(principled(found.engine), indent=4)
+    return SCRIPT.format(name=found.name, quoted=json.dumps(found.name), inputs=inputs)
+
+
+def principled(engine: Engine) -> dict[str, Any]:
+    """Inputs of a Principled BSDF by the names that Blender shows: numbers, and colours as lists."""
+    found: dict[str, Any] = {
+        "Base Color": words.color(engine.base_color),
+        "Metallic": words.metallic(engine),
+        "IOR": words.digits(engine.ior) if engine.base == "glossy" else 1.5,
+        "Specular IOR Level": 0.5 if engine.base == "glossy" else 0.0,  # 0: a dielectric without a lobe
+    } | _lobe(engine)
+    if engine.edge_tint is not None:
+        found["Specular Tint"] = words.color(engine.edge_tint)
+    if engine.coat_alpha is not None:
+        found |= {
+            "Coat Weight": 1.0,
+            "Coat Roughness": words.roughness(engine.coat_alpha),
+            "Coat IOR": words.digits(engine.coat_ior),
+        }
+        if engine.coat_tau is not None:
+            found["Coat Tint"] = words.tint(engine, 2.0)
+    return found
+
+
+def _lobe(engine: Engine) -> dict[str, float]:
+    """Cycles has alpha / aspect along the tangent and alpha aspect across it, aspect^2 = 1 - .9 anisotropic."""
+    pair = words.widths(engine)
+    if pair is None:
+        return {"Roughness": 1.0 if engine.alpha is None else words.roughness(engine.alpha)}
+    anisotropic = min((1.0 - pair[1] / pair[0]) / 0.9, 1.0)
+    grain = {"Roughness": words.roughness(math.sqrt(pair[0] * pair[1])), "Anisotropic": words.digits(anisotropic)}
+    return grain | ({"Anisotropic Rotation": 0.25} if words.across(engine) else {})
+
+
+DEFAULTS: dict[str, Any] = {
+    "Base Color": [0.8, 0.8, 0.8],
+    "Metallic": 0.0,
+    "Roughness": 0.5,
+    "IOR": 1.5,
+    "Specular IOR Level": 0.5,
+    "Specular Tint": [1.0, 1.0, 1.0],
+    "Anisotropic": 0.0,
+    "Anisotropic Rotation": 0.0,
+    "Coat Weight": 0.0,
+    "Coat Roughness": 0.03,
+    "Coat IOR": 1.5,
+    "Coat Tint": [1.0, 1.0, 1.0],
+}
+"""Of the inputs that are read (Blender 4 and 5)."""
+
+
+def read(path: Path, document: Any) -> Engine:
+    """The inputs of a Principled BSDF: {"schema": "layerfit/principled", "inputs": {...}}."""
+    given = document.get("inputs") if isinstance(document, dict) and document.get("schema") == SCHEMA else None
+    if not isinstance(given, dict):
+        raise InputError(f'{path}: not a material of Blender: "schema" should be {SCHEMA!r}')
+    return engine_of(DEFAULTS | {key: _value(value, key, path) for key, value in given.items() if key in DEFAULTS})
+
+
+def _value(value: Any, key: str, path: Path) -> Any:
+    wanted = DEFAULTS[key]
+    if isinstance(wanted, list) and isinstance(value, list) and len(value) in (3, 4) and all(map(is_number, value)):
+        return value[:3]
+    if isinstance(wanted, float) and is_number(value):
+        return value
+    raise InputError(f"{path}: {key} = {value!r}: should be {'three numbers' if isinstance(wanted, list) else 'a number'}")
+
+
+def engine_of(values: dict[str, Any]) -> Engine:
+    """The coat over a base of a Principled BSDF's inputs."""
+    coated = values["Coat Weight"] > 0.0
+    kind = words.base_of(values["Metallic"], values["Specular IOR Level"] > 0.0 and not coated)
+    found: dict[str, Any] = {"base": kind, "base_color": np.asarray(values["Base Color"], float)}
+    alpha = max(values["Roughness"] ** 2, 1e-3)
+    if kind == "mixed":
+        found["metallic"] = values["Metallic"]
+    if kind in ("metal", "mixed"):
+        found["edge_tint"] = np.asarray(values["Specular Tint"], float)
+    if kind == "glossy":
+        found["ior"] = float(np.clip(values["IOR"], 1.0, 3.0))
+    if values["Anisotropic"] > 0.0:
+        aspect = math.sqrt(1.0 - 0.9 * min(values["Anisotropic"], 1.0))
+        turned = abs(math.sin(2.0 * math.pi * values["Anisotropic Rotation"])) > 0.5
+        pair = (alpha / aspect, alpha * aspect)
+        found |= dict(zip(("alpha_x", "alpha_y"), pair[::-1] if turned else pair, strict=True))
+    elif kind != "diffuse":
+        found["alpha"] = alpha
+    if coated:
+        found |= {"coat_alpha": max(values["Coat Roughness"] ** 2, 1e-3), "coat_ior": values["Coat IOR"]}
+        if min(values["Coat Tint"]) < 1.0:
+            found["coat_tau"] = words.depth(values["Coat Tint"], 2.0)
+    return Engine(dialect="blender", **found)

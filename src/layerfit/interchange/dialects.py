@@ -1,0 +1,99 @@
+"""In what the coats and metals of other programs differ: one row each, read from their specifications and sources."""
+
+import dataclasses
+from typing import Literal
+
+
+@dataclasses.dataclass(frozen=True)
+class Dialect:
+    """What a program makes of a coat over a base. What two of them do alike is in `engine`."""
+
+    title: str
+    """Name and version of the formula, for people."""
+    exact: bool
+    """Whether dielectrics reflect by Fresnel's equations; else by Schlick's formula."""
+    coat_index: bool
+    """Whether the coat has an index of its own; else it is `COAT_INDEX`."""
+    coat_masking: Literal["smith", "kelemen"]
+    passes: Literal["view", "half", "albedo"]
+    """The rest that reaches the base: 1 - F of the angle of view, 1 - F of the half angle, or 1 - the lobe's own albedo."""
+    path: Literal["both", "view", "flat"] | None
+    """Way through the absorbing coat: of both directions refracted, twice that of the viewer, twice its thickness; None where it cannot absorb."""
+    edge_tint: bool
+    """Whether a metal has a reflectance of its own at 82 degrees (Hoffman 2019)."""
+    layered: bool
+    """Whether a base's dielectric lobe takes from its diffuse part."""
+    compensates: bool = False
+    """Whether lobes are scaled for light that goes to and fro between facets (Turquin 2019)."""
+    masks_evenly: bool = False
+    """Whether facets with a grain hide one another as those without do."""
+    widens: float = 0.0
+    """What of the coat's alpha^2 is added to that of the metal or dielectric below it."""
+    darkens: bool = False
+    """Whether light that the coat sends back to a diffuse base is counted."""
+
+
+COAT_INDEX = 1.5
+"""Of the coats of glTF and three.js."""
+
+DIALECTS = {
+    # MaterialX 1.39, libraries/bxdf/open_pbr_surface.mtlx and the GLSL of its pbrlib: its coat absorbs without regard to the angle.
+    "openpbr": Dialect(
+        "OpenPBR 1.1 as MaterialX 1.39 prints it",
+        exact=True,
+        coat_index=True,
+        coat_masking="smith",
+        passes="albedo",
+        path="flat",
+        edge_tint=True,
+        layered=True,
+        compensates=True,
+        masks_evenly=True,
+        widens=2.0,
+        darkens=True,
+    ),
+    # glTF 2.0, appendix B, and the README of KHR_materials_clearcoat ("fresnel_coat").
+    "gltf": Dialect(
+        "glTF 2.0 with KHR_materials_clearcoat",
+        exact=False,
+        coat_index=False,
+        coat_masking="smith",
+        passes="view",
+        path=None,
+        edge_tint=False,
+        layered=True,
+    ),
+    # Cycles 5.0, kernel/svm/closure.h, with the distribution GGX: the light that leaves is taken to go as the viewer looks.
+    "blender": Dialect(
+        "Blender 4 and 5, Principled BSDF in Cycles",
+        exact=True,
+        coat_index=True,
+        coat_masking="smith",
+        passes="view",
+        path="view",
+        edge_tint=True,
+        layered=True,
+    ),
+    # three.js, lights_physical_pars_fragment.glsl: the diffuse part is not attenuated by the lobe beside it.
+    "three": Dialect(
+        "three.js MeshPhysicalMaterial",
+        exact=False,
+        coat_index=False,
+        coat_masking="smith",
+        passes="view",
+        path=None,
+        edge_tint=False,
+        layered=False,
+    ),
+    # Babylon.js, pbrClearCoatFunctions and pbrDirectLightingFunctions.
+    "babylon": Dialect(
+        "Babylon.js PBRMaterial with a clear coat",
+        exact=False,
+        coat_index=True,
+        coat_masking="kelemen",
+        passes="half",
+        path="both",
+        edge_tint=False,
+        layered=False,
+    ),
+}
