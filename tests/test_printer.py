@@ -158,6 +158,19 @@ def test_primitive_on_the_gpu(gl, name):
     assert error.max() <= LOOSE.get(name, 1e-6), (error.max(), source)
 
 
+def test_what_a_loop_reads_keeps_its_name_to_the_end_of_the_loop(gl):
+    """A value from outside is read again in the next turn: its name was given to another one after its last use in the text."""
+
+    def summed(outside):
+        def step(total, x):
+            return total + (lambda inside: inside * inside)(jnp.cos(outside * x)), None
+
+        return jax.lax.scan(step, outside, jnp.asarray(np.arange(1, 6, dtype=np.float32)))[0]
+
+    gpu, model, source = run_both(lambda a: summed(a * a + 1.0), UNIT)
+    np.testing.assert_allclose(gpu, model, rtol=1e-5, err_msg=source)
+
+
 def test_the_hash_is_the_same_to_the_bit(gl):
     """On the GPU, in JAX, and in Python's own whole numbers."""
 
@@ -227,9 +240,16 @@ def test_validates(name, uniforms, target, tmp_path):
     assert run.returncode == 0, run.stdout
 
 
-@pytest.mark.parametrize(
-    "name", ["corrected over lambert", "corrected over conductor", "corrected, anisotropic", "faithful over conductor"]
+UNIFORMS = (
+    "corrected over lambert",
+    "corrected over conductor",
+    "corrected, anisotropic",
+    "milky over lambert",
+    "faithful over conductor",
 )
+
+
+@pytest.mark.parametrize("name", UNIFORMS)
 def test_uniforms_and_constants_draw_the_same(gl, name):
     from layerfit.shader.verify import shade_samples
 

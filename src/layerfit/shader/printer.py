@@ -307,7 +307,8 @@ class Body:
         self.lines[-1] = f"for (int {counter.text} = 0; {counter.text} < {p['length']}; ++{counter.text}) {{"
         self.taken.add(counter.text)
         start = len(self.lines)
-        known = dict(self.declared)
+        known, taken = dict(self.declared), set(self.taken)
+        self.taken.update(*(value.reads for value in outer))  # read again in the next turn, however early in this one
         frame = _Frame(self.printer, closed.jaxpr, closed.consts)
         items = [Value(f"{row.text}[{counter.text}]", "float", reads=row.reads) for row in rows]
         frame.values.update(zip(closed.jaxpr.invars, [*outer, *state, *items], strict=True))
@@ -317,7 +318,7 @@ class Body:
         for target, result, kind in zip(state, results, kinds, strict=True):
             self.lines.append(f"{target.text} = {lift(result, kind).text};")
         self.lines[start:] = [f"    {line}" for line in self.lines[start:]] + ["}"]
-        self.declared = known
+        self.declared, self.taken = known, taken
         return state
 
 
