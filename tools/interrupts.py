@@ -91,6 +91,8 @@ class Trial:
         self.run("before")  # compiles
         began = time.perf_counter()
         once, twice = self.run("once"), self.run("twice")
+        if "Traceback" in once.err:
+            raise RuntimeError(f"{name}, left alone: {once.err}")
         self.seconds = (time.perf_counter() - began) / 2
         self.code, self.names = once.code, once.files.keys()
         self.same = {name: content for name, content in once.files.items() if twice.files[name] == content}
