@@ -3,10 +3,14 @@ traceback, and nothing on the disk that was not there before.
 """
 
 import json
+import os
 import re
 import shutil
+import sys
 from pathlib import Path
+from unittest import mock
 
+import moderngl
 import numpy as np
 import pytest
 
@@ -300,6 +304,43 @@ def test_a_machine_without_a_gl_driver(command, folder):
         r"apt-get install .*libegl1 libgl1-mesa-dri",
     )
     assert snapshot(folder) == before
+
+
+def test_a_driver_that_is_too_old(folder):
+    ran = process("verify", folder / "truth.json", environment={"MESA_GL_VERSION_OVERRIDE": "3.1", "DISPLAY": ""})
+    refused(folder, ran, r"no OpenGL 3\.3 driver was found \(egl: ")
+
+
+def test_a_driver_without_float_targets(folder, gl, monkeypatch):
+    def incomplete(*_):
+        raise moderngl.Error("the framebuffer is not complete")
+
+    monkeypatch.setattr("layerfit.shader.gl._targets", [])
+    monkeypatch.setattr(
+        "layerfit.shader.gl.context", lambda: mock.Mock(info=gl.info, framebuffer=incomplete, program=gl.program)
+    )
+    refuses(folder, ["verify", folder / "truth.json"], r"does not draw to float32 images", r"LIBGL_ALWAYS_SOFTWARE=1")
+
+
+def test_a_device_that_is_not_there(folder):
+    (folder / "d.csv").write_text("wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n0,0,1,0,0,1\n")
+    before = snapshot(folder)
+    ran = process("eval", folder / "truth.json", "d.csv", environment={"JAX_PLATFORMS": "cuda"}, cwd=folder)
+    refused(folder, ran, r"JAX does not find the device that JAX_PLATFORMS=cuda asks for", r"unset JAX_PLATFORMS")
+    assert snapshot(folder) == before
+
+
+def test_a_package_that_is_missing(folder, tmp_path):
+    hidden = tmp_path / "hidden"
+    hidden.mkdir()
+    (hidden / "moderngl.py").write_text("raise ModuleNotFoundError(\"No module named 'moderngl'\", name='moderngl')")
+    path = os.pathsep.join([str(hidden), *sys.path])
+    ran = process("verify", folder / "truth.json", environment={"PYTHONPATH": path})
+    refused(folder, ran, r"the Python package moderngl cannot be imported", r"pip install", r"layerfit doctor")
+    ran = process("doctor", environment={"PYTHONPATH": path, "JAX_PLATFORMS": "cuda"})
+    assert ran.code == 1, ran.err
+    assert "No module named 'moderngl'" in ran.out
+    assert "JAX does not find the device" in ran.out
 
 
 def test_a_fault_ends_the_process_with_2_and_a_word(folder):

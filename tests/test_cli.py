@@ -21,6 +21,7 @@ from layerfit._data import references
 from layerfit.capture.exr import read_exr
 from layerfit.preset import read_preset
 from layerfit.render import brdf
+from layerfit.shader.verify import check_image
 
 COMMANDS = (
     "fit",
@@ -298,6 +299,30 @@ def test_a_shader_that_is_not_the_material_is_a_finding(scene, gl, tmp_path, mon
     assert document["converged"] is True
     assert document["flags"] == ["shader_differs"]
     assert "is NOT the fitted material" in (tmp_path / "report.html").read_text()
+
+
+def test_a_driver_that_miscompiles_gets_no_shader(scene, gl, tmp_path, monkeypatch):
+    """One channel of one pixel is 1 % off: it is named, the shader of an earlier fit goes, and `--force` writes the new one."""
+    x, y, row = 20, 17, []
+
+    def miscompiled(image, model, index, width):
+        row[:] = np.flatnonzero(index == y * width + x)
+        image[row, 1] *= 1.01
+        return check_image(image, model, index, width)
+
+    monkeypatch.setattr("layerfit.job.check_image", miscompiled)
+    (tmp_path / "material.frag").write_text("of an earlier fit")
+    ran = layerfit("fit", scene, "-o", tmp_path, "--starts", "1", "--json")
+    assert row, "a pixel of the sphere"
+    assert ran.code == 1
+    assert "material.frag is NOT written" in ran.err
+    assert f"g at pixel x {x}, y {y}" in ran.err
+    worst = json.loads(ran.out)["parity"]["worst"]
+    assert (worst["x"], worst["y"], worst["channel"]) == (x, y, "g")
+    assert not (tmp_path / "material.frag").exists()
+    assert f"pixel x {x}, y {y}" in (tmp_path / "report.html").read_text()
+    assert layerfit("fit", scene, "-o", tmp_path, "--starts", "1", "--force").code == 1
+    assert "lf_brdf" in (tmp_path / "material.frag").read_text()
 
 
 def test_a_fit_that_does_not_converge_is_a_finding(scene, gl, tmp_path, monkeypatch):

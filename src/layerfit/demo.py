@@ -23,7 +23,8 @@ def run(directory: Path, say: Callable[[str], None], progress: Progress) -> dict
             say(f"      {line}")
     say("\nPictures and reports:")
     for outcome in outcomes.values():
-        say(f"  {outcome.directory / 'fit.png'}  (report.html, material.frag, preset.json beside it)")
+        beside = ", ".join(name for name in ("report.html", "material.frag", "preset.json") if name in outcome.written)
+        say(f"  {outcome.directory / 'fit.png'}  ({beside} beside it)")
     return outcomes
 
 

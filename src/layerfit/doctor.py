@@ -4,6 +4,7 @@ import dataclasses
 import platform
 import re
 import shutil
+import sys
 import webbrowser
 from collections.abc import Iterator
 from importlib import metadata
@@ -136,21 +137,51 @@ def _version(package: str) -> str:
         return ""
 
 
+def no_device() -> str | None:
+    """Why JAX has no device to compute on; None where it has one."""
+    import jax
+
+    try:
+        jax.devices()
+    except (RuntimeError, AssertionError) as error:  # JAX asserts that there is a device, of a name that it knows
+        asked = jax.config.jax_platforms  # pyright: ignore[reportAttributeAccessIssue]
+        return f"JAX does not find the device that JAX_PLATFORMS={asked} asks for{f' ({error})' if str(error) else ''}"
+    return None
+
+
+def at_fault(error: Exception) -> MachineError | None:
+    """What the machine lacks that an exception comes from; None where it is another's fault."""
+    if isinstance(error, ImportError) and not (error.name or "layerfit").startswith("layerfit"):
+        return MachineError(
+            f"the Python package {error.name} cannot be imported ({error}), which this needs: "
+            "pip install --force-reinstall layerfit. `layerfit doctor` says what else is missing."
+        )
+    if "jax" in sys.modules and (reason := no_device()):
+        return MachineError(f"{reason}. Take it away (unset JAX_PLATFORMS), or install what it needs: layerfit runs on a CPU.")
+    return None
+
+
 def _jax() -> Finding:
     import jax
 
+    gives = "fits and renders"
+    if reason := no_device():
+        return Finding("jax", "device", False, reason, True, gives, "unset JAX_PLATFORMS")
     devices = jax.devices()
     kinds = ", ".join(sorted({device.device_kind for device in devices}))
-    return Finding("jax", "device", True, f"{len(devices)} x {kinds}, {jax.default_backend()}", True, "fits and renders")
+    return Finding("jax", "device", True, f"{len(devices)} x {kinds}, {jax.default_backend()}", True, gives)
 
 
 def _opengl() -> Iterator[Finding]:
     """The driver, and whether it draws to float32."""
     import numpy as np
 
-    from .shader.gl import renderer, shade_points
-
     gives = "the shader is rendered and compared"
+    try:
+        from .shader.gl import renderer, shade_points
+    except ImportError as error:
+        yield Finding("opengl", "driver", False, str(error), True, gives, "pip install --force-reinstall layerfit")
+        return
     try:
         driver = renderer()
         back = shade_points(PROBE, {"v_sent": np.array(SENT, np.float32)})

@@ -156,14 +156,18 @@ def write_text(path: Path, content: str) -> None:
     write_bytes(path, content.encode())
 
 
-def write_files(directory: Path, contents: Mapping[str, str | bytes]) -> None:
-    """Write the files of one result, by their names in a directory: all of them, or none where one cannot be written.
+def write_files(directory: Path, contents: Mapping[str, str | bytes | None]) -> None:
+    """Write the files of one result, by their names in a directory: all of them, or none where one cannot be written. None is a file that
+    this result does not have: that of an earlier one goes.
 
     They take their names in this order, at once when all are written, and those of two processes one after the other: what stands in
     the directory is of one result.
     """
     with one_writer(directory), undisturbed(), contextlib.ExitStack() as files:
         for name, content in reversed(list(contents.items())):  # what is entered last leaves first
+            if content is None:
+                files.callback((directory / name).unlink, missing_ok=True)
+                continue
             place = files.enter_context(whole(directory / name))
             place.write_bytes(content.encode() if isinstance(content, str) else content)
 

@@ -55,6 +55,8 @@ class Outcome:
     directory: Path
     good: bool
     """Converged, shader verified."""
+    written: list[str]
+    """The files, by their names in the directory."""
 
 
 def fit_scene(
@@ -65,10 +67,12 @@ def fit_scene(
     progress: Progress = lambda stage, share: None,
     profile: Sequence[str] = (),
     model_error: bool = True,
+    force: bool = False,
     **options: Any,
 ) -> Outcome:
-    """Fit a scene, or its file, and write everything to `directory`; each file whole or not at all, `fit.json` last.
+    """Fit a scene, or its file, and write everything to `directory`: all files whole, or none.
 
+    A shader that the driver draws otherwise than JAX computes it is not written, but by `force`.
     `profile` are parameters whose intervals are found by fitting the others again; without `model_error` sigmas are of the noise alone.
     `options` override the scene's [fit] table. Raises `LayerfitError` for input or a machine that is at fault.
     """
@@ -124,16 +128,17 @@ def fit_scene(
     in_planes = _planes(result, name)
     trace = [(row.time_s, row.stage, row.start, row.error) for row in result.trace]
     files = {
-        "material.frag": shader.text(),
+        "material.frag": shader.text() if parity.passed or force else None,
         "trace.csv": _trace(result),
         "fit.png": picture,
-        **({} if in_planes is None else {"planes.png": in_planes}),
+        "planes.png": in_planes,
         "preset.json": json.dumps(preset_of(result.stack, name, fit=_summary(document)), indent=2) + "\n",
         "report.html": html.page(name, document, pairs, picture, trace, shader.text(), live, in_planes),
         "fit.json": json.dumps(document, indent=2, allow_nan=False) + "\n",
     }
     write_files(directory, files)
-    return Outcome(document, directory, result.converged and parity.passed)
+    written = [name for name, content in files.items() if content is not None]
+    return Outcome(document, directory, result.converged and parity.passed, written)
 
 
 def asked(scene: Scene, options: Mapping[str, Any]) -> Scene:

@@ -51,13 +51,14 @@ def specialise(
     *,
     tolerance: float = 0.005,
     name: str | None = None,
+    force: bool = False,
     progress: Progress = lambda stage, share: None,
 ) -> dict[str, Any]:
     """Leave out what a scene does not need, part by part, and write the material that is left; returns the content of `specialise.json`.
 
     The part that saves most instructions is tried first: the rest is fitted to the scene's references again, from where it was. It stays out while
     the relative L2 error of the scene's pixels is at most `tolerance` above that of the whole material. What was done is kept when it is
-    interrupted. Raises `LayerfitError` for input or a machine that is at fault.
+    interrupted. A shader that differs from JAX is not written, but by `force`. Raises `LayerfitError` for input or a machine that is at fault.
     """
     stack = preset if isinstance(preset, Stack) else read_preset(Path(preset))
     name = name or ("material" if isinstance(preset, Stack) else Path(preset).stem)
@@ -95,13 +96,13 @@ def specialise(
             "numbers": {key: _numbers(way) for key, way in ways.items()},
             "tried": rows,
             "left_out": left_out(found.stack),
-            "parity": parity.to_json() | {"passed": parity.passed},
+            "parity": parity.to_json() | {"passed": parity.passed, "renderer": parity.renderer},
         }
     )
     document["in_words"] = report.sentences(document)
     record = {"scene": str(read.path), "tolerance": tolerance, "removed": [row for row in rows if row["removed"]]}
     files = {
-        "material.frag": print_material(found.stack, name).text(),
+        "material.frag": print_material(found.stack, name).text() if parity.passed or force else None,
         "preset.json": json.dumps(preset_of(found.stack, name, fit={"specialised": record}), indent=2) + "\n",
         "specialise.html": report.page(document),
         "specialise.json": json.dumps(document, indent=2, allow_nan=False) + "\n",

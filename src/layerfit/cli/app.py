@@ -5,7 +5,7 @@ import inspect
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.markup import escape
@@ -40,6 +40,10 @@ Starts = Annotated[int | None, typer.Option(min=1, help="Starts that are tried; 
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of starts and pixel choices.")]
 Metric = Annotated[str | None, typer.Option(help="law, uniform, relative, log or cube_root.", autocompletion=complete.metrics)]
 Loss = Annotated[str | None, typer.Option(help="square, huber or cauchy.", autocompletion=complete.losses)]
+
+Force = Annotated[
+    bool, typer.Option("--force", help="Write the shader even where the driver draws it otherwise than JAX computes it.")
+]
 
 _COMMON = {
     "as_json": (("--json",), "Print the result as JSON on standard output."),
@@ -88,14 +92,25 @@ def main() -> None:
     try:
         app()
     except LayerfitError as error:
-        if manner.verbose:
-            stderr.print_exception(width=stderr.width)
-        stderr.print(f"[bold red]layerfit:[/] {escape(str(error))}", soft_wrap=True)
-        sys.exit(2)
+        _refuse(error)
     except SystemExit as end:
         if end.code == 130:  # what typer makes of an interrupt
             say("layerfit: interrupted; every file that was written is whole")
         raise
+    except Exception as error:
+        from ..doctor import at_fault
+
+        machine = at_fault(error)
+        if machine is None:
+            raise
+        _refuse(machine)
+
+
+def _refuse(error: LayerfitError) -> NoReturn:
+    if manner.verbose:
+        stderr.print_exception(width=stderr.width)
+    stderr.print(f"[bold red]layerfit:[/] {escape(str(error))}", soft_wrap=True)
+    sys.exit(2)
 
 
 def check_choice(value: str | None, known: tuple[str, ...], option: str) -> None:

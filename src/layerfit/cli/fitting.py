@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from . import complete
-from .app import Loss, Metric, Output, Scene, Seed, Starts, check_choice, command
+from .app import Force, Loss, Metric, Output, Scene, Seed, Starts, check_choice, command
 from .talk import STARTED, Done, many, progress, say, show
 
 STARTS_MORE = 32
@@ -36,10 +36,12 @@ def fit(
             help="Parameter whose 95 % interval is found by fitting the others again, such as coat.tau; may be repeated.",
         ),
     ] = None,
+    force: Force = False,
 ) -> Done:
     """Fit a material to a reference render or a measured BRDF.
 
-    Leaves `fit.json`, `preset.json`, `material.frag`, `report.html`, `fit.png` and `trace.csv` in the output directory.
+    Leaves `fit.json`, `preset.json`, `material.frag`, `report.html`, `fit.png` and `trace.csv` in the output directory; no `material.frag`
+    where the driver draws the shader otherwise than JAX computes it.
 
     Example: `layerfit fit examples/references/lacquered_copper.toml -o out/copper`
     """
@@ -59,6 +61,7 @@ def fit(
             import_s=imported,
             progress=report,
             profile=profile or (),
+            force=force,
             starts=starts,
             seed=seed,
             metric=metric,
@@ -80,11 +83,13 @@ def _starting(scene: Path, start: Path) -> Any:
 
 
 def _show_fit(outcome: Any) -> None:
-    from ..report.text import lines
+    from ..report.text import lines, not_written
 
     for line in lines(outcome.document):
         say(line)
-    say(f"Wrote fit.png, report.html, material.frag, preset.json, fit.json and trace.csv in {outcome.directory}/")
+    say(f"Wrote {', '.join(outcome.written[:-1])} and {outcome.written[-1]} in {outcome.directory}/")
+    if "material.frag" not in outcome.written:
+        say(not_written(outcome.document["parity"]))
 
 
 def _after_fit(flags: Sequence[str], scene: Path, output: Path) -> tuple[Any, ...]:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .app import Output, Preset, Scene, command
+from .app import Force, Output, Preset, Scene, command
 from .talk import Done, progress, say, show
 
 
@@ -98,6 +98,7 @@ def specialise(
     tolerance: Annotated[
         float, typer.Option(parser=_part, metavar="PART", help="By how much the error of the image may grow: 0.5% or 0.005.")
     ] = 0.005,
+    force: Force = False,
 ) -> Done:
     """Leave out what one scene does not need of a material: part by part, the rest fitted again.
 
@@ -110,14 +111,18 @@ def specialise(
 
     use_compilation_cache()
     from ..report.specialise import table
+    from ..report.text import not_written
     from ..specialising import specialise as reduce
 
     with progress() as report:
-        document = reduce(preset, scene, output, tolerance=tolerance, progress=report)
+        document = reduce(preset, scene, output, tolerance=tolerance, force=force, progress=report)
     show(table(document))
     for sentence in document["in_words"]:
         say(sentence)
-    say(f"Wrote preset.json, material.frag, specialise.html and specialise.json in {output}/")
+    shader = document["parity"]["passed"] or force
+    say(f"Wrote preset.json, {'material.frag, ' if shader else ''}specialise.html and specialise.json in {output}/")
+    if not shader:
+        say(not_written(document["parity"]))
     return Done(document, ("verify", output / "preset.json", scene), document["parity"]["passed"])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from ..fit import words
 from . import charts, pages
 from .comparison import Pair, comparisons
-from .text import image_error, lines, relative
+from .text import image_error, lines, relative, worst
 
 
 def page(
@@ -65,5 +65,5 @@ def _verdict(document: Mapping[str, Any]) -> str:
     return (
         f"The fit {'converged' if document['converged'] else 'did NOT converge'}; its error is {image_error(document['error'])}.{poor} "
         f"The shader {'is' if parity['passed'] else 'is NOT'} the fitted material: "
-        f"the largest relative difference from JAX is {relative(parity['max_rel'])}."
+        f"the largest relative difference from JAX is {relative(parity['max_rel'])}, {worst(parity['worst'])}."
     )

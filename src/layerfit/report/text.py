@@ -44,6 +44,14 @@ def lines(document: Mapping[str, Any]) -> list[str]:
     return [*out, "[[Time]]", f"    {_time(d['time'])}"]
 
 
+def not_written(parity: Mapping[str, Any]) -> str:
+    """Why there is no shader."""
+    return (
+        f"material.frag is NOT written: as {parity['renderer']} draws it, it is not the material ({worst(parity['worst'])}). "
+        "Try another driver (`layerfit doctor` says which this is); --force writes it all the same."
+    )
+
+
 def verdict(parity: Mapping[str, Any]) -> str:
     """Whether the shader is the material, in a word."""
     return "PASS" if parity["passed"] else "FAILURE"

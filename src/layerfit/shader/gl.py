@@ -128,7 +128,13 @@ def float_target(size: tuple[int, int]) -> moderngl.Framebuffer:
     """A float32 framebuffer of this size, in use; the previous one is kept where it fits and released where not."""
     if _targets and _targets[0].size == size:
         return _targets[0]
-    new = context().framebuffer([context().texture(size, 4, dtype="f4")])
+    try:
+        new = context().framebuffer([context().texture(size, 4, dtype="f4")])
+    except moderngl.Error as error:
+        raise MachineError(
+            f"the GL driver ({renderer()}) does not draw to float32 images of {size[0]} x {size[1]} pixels ({error}), without which no shader "
+            "can be verified. Use another driver: LIBGL_ALWAYS_SOFTWARE=1 chooses Mesa's own."
+        ) from None
     new.use()  # before the old one goes: moderngl would bind the released one again
     for old in _targets:
         old.color_attachments[0].release()
