@@ -52,6 +52,14 @@ def test_pages_are_whole_and_ask_nothing_of_the_network(site):
                 assert (site / link.partition("#")[0].partition("?")[0]).exists(), f"{page.name}: {link}"
 
 
+def test_notebooks_are_pages_with_their_words_and_code(site):
+    for path in sorted((REPOSITORY / "examples").glob("*.ipynb")):
+        page = (site / "examples" / f"{path.stem}.html").read_text()
+        assert path.name in page
+        assert "use_compilation_cache" in page
+        assert f"examples/{path.stem}.html" in (site / "guide_researchers.html").read_text()
+
+
 def test_every_public_name_and_command_has_its_place(site):
     python, commands = (site / "python.html").read_text(), (site / "commands.html").read_text()
     for name in layerfit.__all__:

@@ -1,8 +1,10 @@
 """What the documentation site has beside docs/*.md: pages made from where their text already stands.
 
-The front page is the README, the commands are what `layerfit --help` says, the Python pages are the docstrings of the public names.
+The front page is the README, the commands are what `layerfit --help` says, the Python pages are the docstrings of the public names, and
+the tutorials are the notebooks.
 """
 
+import json
 import os
 import re
 import subprocess
@@ -14,6 +16,7 @@ from mkdocs.structure.files import File, Files
 
 REPOSITORY = Path(__file__).parents[1]
 PUBLIC = REPOSITORY / "src" / "layerfit" / "__init__.pyi"
+NOTEBOOKS = sorted((REPOSITORY / "examples").glob("*.ipynb"))
 BESIDE = ("shaders/presets/*.*", "shaders/README.md", "examples/references/README.md", "CONTRIBUTING.md")
 """Files outside docs/ that pages link to."""
 
@@ -26,6 +29,7 @@ def on_files(files: Files, config: Any) -> Files:
         "commands.md": commands(),
         "python.md": python(PUBLIC.read_text()),
     }
+    made |= {f"examples/{path.stem}.md": notebook(path) for path in NOTEBOOKS}
     for name, text in made.items():
         files.append(File.generated(config, name, content=text))
     for pattern in BESIDE:
@@ -35,8 +39,22 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Pages of docs/ link to what stands beside it; on the site that stands beside them."""
+    """Pages of docs/ link to what stands beside it; on the site that stands beside them, and a notebook is a page."""
+    markdown = re.sub(r"\.ipynb\)", ".md)", markdown)
     return re.sub(r"\]\(\.\./", "](", markdown) if "/" not in page.file.src_uri else from_root(markdown, up="../")
+
+
+def notebook(path: Path) -> str:
+    """A notebook as a page: its words, and its code. (mkdocs-jupyter brings pages that fetch scripts from elsewhere.)"""
+    cells = json.loads(path.read_text())["cells"]
+    parts = [
+        "".join(cell["source"]) if cell["cell_type"] == "markdown" else f"```python\n{''.join(cell['source'])}\n```"
+        for cell in cells
+    ]
+    where = (
+        f"This page is the notebook `examples/{path.name}`: run it in Jupyter or VS Code, where its figures and sliders show."
+    )
+    return "\n\n".join([parts[0], where, *parts[1:]])
 
 
 def from_root(text: str, up: str = "") -> str:
