@@ -146,9 +146,10 @@ class _Fit:
         """Starts: the given one, and the best of many space-filling ones. What has no effect at any of them is held."""
         problem = self.problem
         drawn = space_filling(problem.free, SCREENED * (self.starts - 1), self.seed)
-        order = np.argsort([problem.glance(point) for point in drawn], kind="stable")
-        points = [problem.free.pack(problem.start), *(drawn[k] for k in order[: self.starts - 1])]
-        effects = problem.effects(points, count)
+        (_, effect), *looked = problem.look([problem.free.pack(problem.start), *drawn], count)
+        order = np.argsort([cost for cost, _ in looked], kind="stable")[: self.starts - 1]
+        points = [problem.free.pack(problem.start), *(drawn[k] for k in order)]
+        effects = [effect, *(looked[k][1] for k in order)]
         seen = [effect > 1e-7 * effect.max() for effect in effects if effect is not None]
         if not seen:
             raise InputError(f"{self.where}: the start gives no finite image; choose other values in [material]")

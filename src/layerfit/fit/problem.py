@@ -27,6 +27,9 @@ from .weights import Lost, brightness, inverse_sigma, lost, noise_law, robust
 AT_ONCE = 2_000_000
 """Evaluations of a BRDF that are not interrupted: a second of them."""
 
+SIDE_BY_SIDE = 4
+"""Evaluations that are begun before the first is waited for."""
+
 
 class Problem:
     """Residuals of a material against references, with weights that follow a model; vectors are in the coordinates of the fit."""
@@ -43,8 +46,6 @@ class Problem:
             by = [self.curves[k] for k in self.layout.reference[:, 0]]
             each = jax.tree.map(lambda *of: held(np.stack(of)[:, :, None]), *by)  # beside the pixels of a channel
             self.blocks = dataclasses.replace(self.blocks, curve=each)
-        first = self.layout.pixel[: len(views)]  # a block of each reference, in their order
-        self.few = [s.some(block[block >= 0]) for s, block in zip(self.samples, first, strict=True)]
         self.release(start, free)
 
     @property
@@ -73,7 +74,7 @@ class Problem:
     def weigh(self, u: np.ndarray | None) -> None:
         """Set the residual weights from the model at `u`, or equal ones before there is a model."""
         if u is None:
-            values = self._even(self.samples)
+            values = self._even()
         else:
             models = self.models(u, self.samples)
             values = self.weights(models, self.metric)
@@ -118,12 +119,12 @@ class Problem:
                 found += [(error * self.inverse_sigma * one).reshape(-1, 3) for one in np.eye(3) if np.any(error * one)]
         return found
 
-    def _even(self, samples: Sequence[Samples]) -> list[np.ndarray]:
+    def _even(self) -> list[np.ndarray]:
         """Weights before there is a model. A measurement has no noise to speak of, and a highlight a thousand times as bright as all else:
         there the law holds from the first."""
-        plain = ["law" if s.shape is None else "uniform" for s in samples]
-        first = plain if self.curves[0] is None else [self.metric] * len(samples)
-        return [inverse_sigma(s.target, s.target, None, metric) for s, metric in zip(samples, first, strict=True)]
+        plain = ["law" if s.shape is None else "uniform" for s in self.samples]
+        first = plain if self.curves[0] is None else [self.metric] * len(self.samples)
+        return [inverse_sigma(s.target, s.target, None, metric) for s, metric in zip(self.samples, first, strict=True)]
 
     def weights(self, models: Sequence[np.ndarray], metric: str) -> list[np.ndarray]:
         """Weights of the residuals of these models, a reference each."""
@@ -172,20 +173,16 @@ class Problem:
         del self.trace[steps:]  # the fit had ended
         return reached
 
-    def glance(self, u: np.ndarray) -> float:
-        """Cost of the first block of each reference at a point, without derivatives."""
-        models, weights = self.models(u, self.few), self._even(self.few)
-        residual = [
-            w * (compared(model, by) - compared(seen.target, by))
-            for model, seen, by, w in zip(models, self.few, self.curves, weights, strict=True)
-        ]
-        cost = sum(np.sum(np.square(r, dtype=float)) for r in residual)
-        return float(cost) if np.isfinite(cost) else np.inf
-
-    def effects(self, points: Sequence[np.ndarray], count: int) -> list[np.ndarray | None]:
-        """How much the images change with each parameter, at some points; None where they are not finite."""
-        states = [self.residuals.steps(u, initial(u), self.bounds, count, 1)[1] for u in points]
-        return [np.sqrt(np.diag(np.asarray(s.gram))) if np.isfinite(float(s.loss)) else None for s in states]
+    def look(self, points: Sequence[np.ndarray], count: int) -> list[tuple[float, np.ndarray | None]]:
+        """Of some points, the cost on the first `count` blocks, and how much those change with each parameter; infinite, and None, where
+        the images are not finite."""
+        found = []
+        for first in range(0, len(points), SIDE_BY_SIDE):
+            some = points[first : first + SIDE_BY_SIDE]
+            for state in [self.residuals.steps(u, initial(u), self.bounds, count, 1)[1] for u in some]:
+                loss, gram = float(state.loss), np.asarray(state.gram)
+                found.append((loss, np.sqrt(np.diag(gram))) if np.isfinite(loss) else (np.inf, None))
+        return found
 
     def discrepancy(
         self, u: np.ndarray, models: Sequence[np.ndarray], jacobian: np.ndarray, gram: np.ndarray, seed: int
