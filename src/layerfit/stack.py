@@ -33,8 +33,7 @@ class Stack:
 
     def astype(self, dtype: Any) -> "Stack":
         """The same material with every number in one precision."""
-        # What is in it stays as it is: a fit asks this a hundred times.
-        return jax.tree.map(lambda x: x if getattr(x, "dtype", None) == dtype else jnp.asarray(x, dtype), self)
+        return jax.tree.map(lambda x: jnp.asarray(x, dtype), self)
 
     def _repr_html_(self) -> str:
         """For notebooks: every number of its layers, the outermost first."""
