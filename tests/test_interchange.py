@@ -311,7 +311,7 @@ BAD = {
         "comes from a graph or a texture",
     ),
     "a.json": ('{"schema": "something"}', "not a material of Blender"),
-    "a.blend": ("BLENDER", "Export a .gltf"),
+    "a.blend": ("BLENDER", "blender-kit"),
 }
 
 

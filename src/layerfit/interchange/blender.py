@@ -100,10 +100,12 @@ DEFAULTS: dict[str, Any] = {
 
 
 def read(path: Path, document: Any) -> Engine:
-    """The inputs of a Principled BSDF: {"schema": "layerfit/principled", "inputs": {...}}."""
+    """The inputs that the script of `layerfit blender-kit` leaves beside a render: {"schema": "layerfit/principled", "inputs": {...}}."""
     given = document.get("inputs") if isinstance(document, dict) and document.get("schema") == SCHEMA else None
     if not isinstance(given, dict):
-        raise InputError(f'{path}: not a material of Blender: "schema" should be {SCHEMA!r}')
+        raise InputError(
+            f'{path}: not a material of Blender: "schema" should be {SCHEMA!r}. `layerfit blender-kit` writes such files'
+        )
     return engine_of(DEFAULTS | {key: _value(value, key, path) for key, value in given.items() if key in DEFAULTS})
 
 

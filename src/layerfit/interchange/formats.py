@@ -123,7 +123,7 @@ def read_start(path: Path) -> Stack:
 
 def _advice(ending: str) -> str:
     if ending == ".blend":
-        return "Export a .gltf from Blender"
+        return "`layerfit blender-kit` writes a script that renders a reference in Blender and leaves its material beside it"
     return "Export it as one of them"
 
 
@@ -138,6 +138,11 @@ def _bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}. Check the path and its permissions.") from None
+
+
+def blender_kit() -> str:
+    """The script that renders a reference in Blender and leaves a scene file and its material beside it."""
+    return (Path(__file__).parent / "kit" / "layerfit_kit.py").read_text(encoding="utf-8")
 
 
 def said(export: Export, name: str) -> list[str]:

@@ -1,0 +1,164 @@
+"""The script that users run in Blender: what it writes is read, what it cannot say it refuses, and Cycles draws the formula that is fitted.
+
+Blender itself is not needed for most of it: a module that looks like `bpy` is enough. `LAYERFIT_BPY` names a Python that has the real one
+(`uv venv --python 3.11 bpy && uv pip install --python bpy/bin/python bpy==5.0.1`).
+"""
+
+import importlib.util
+import json
+import math
+import os
+import subprocess
+import sys
+import types
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from commands import layerfit
+from layerfit.capture.scene import Constant, Directional, Point, SphereLight, read_scene
+from layerfit.interchange import blender, formats
+from layerfit.interchange.mapping import alone
+from layerfit.interchange.stage import draw, scene_views
+from layerfit.stack import Stack
+from layerfit.surfaces import Lambert
+
+CYCLES = 0.02
+"""Relative L2 between Cycles and the formula: its sphere has facets, its pixels a filter, and 64 samples are noise."""
+
+LAMPS: list[dict[str, Any]] = [
+    {"type": "directional", "to_light": [0.0, 0.6, 0.8], "irradiance_rgb": [3.0, 2.0, 1.0]},
+    {"type": "point", "position": [1.0, 2.0, 3.0], "intensity_rgb": [30.0, 30.0, 30.0]},
+    {"type": "sphere", "center": [1.0, 2.0, 3.0], "radius": 0.5, "radiance_rgb": [9.0, 9.0, 9.0]},
+    {"type": "constant", "radiance_rgb": [0.1, 0.1, 0.1]},
+]
+
+
+@pytest.fixture
+def kit(monkeypatch) -> Any:
+    """The script as a module, with something in place of Blender."""
+    stub: Any = types.ModuleType("bpy")
+    stub.app = types.SimpleNamespace(version_string="5.0.1")
+    monkeypatch.setitem(sys.modules, "bpy", stub)
+    spec: Any = importlib.util.spec_from_loader("layerfit_kit", loader=None)
+    module = importlib.util.module_from_spec(spec)
+    exec(compile(formats.blender_kit(), "layerfit_kit.py", "exec"), module.__dict__)
+    return module
+
+
+@pytest.mark.wheel
+def test_the_command_writes_the_script(tmp_path):
+    ran = layerfit("blender-kit", "-o", tmp_path / "kit.py")
+    assert ran.code == 0, ran.err
+    text = (tmp_path / "kit.py").read_text()
+    assert text == formats.blender_kit()
+    assert "import layerfit" not in text  # Blender's Python has none
+    compile(text, "kit.py", "exec")
+
+
+def test_what_it_writes_is_a_scene(kit, tmp_path):
+    camera = {"position": [0.0, -5.0, 0.5], "look_at": [0.0, -4.0, 0.4], "up": [0.0, 0.0, 1.0], "vfov_deg": 25.0}
+    path = tmp_path / "ball.toml"
+    path.write_text(kit.scene_file("ball.exr", 'a "ball"', camera, LAMPS))
+    reference: Any = read_scene(path, Stack((), Lambert(), formats.read_start(_start(tmp_path)).form)).references[0]
+    assert reference.exr == tmp_path / "ball.exr"
+    assert reference.camera.vfov_deg == 25.0
+    assert [type(light) for light in reference.lights] == [Directional, Point, SphereLight, Constant]
+    assert reference.lights[1].intensity_rgb == (30.0, 30.0, 30.0)
+
+
+def _start(folder: Path) -> Path:
+    path = folder / "ball.principled.json"
+    path.write_text(json.dumps({"schema": blender.SCHEMA, "inputs": {"Metallic": 1.0}}))
+    return path
+
+
+class _Place:
+    """As much of a matrix as a lamp needs."""
+
+    translation = (1.0, 2.0, 3.0)
+
+
+def _lamp(**light: Any) -> Any:
+    plain = {"energy": 100.0, "color": (1.0, 0.5, 0.25), "use_nodes": False, "node_tree": None, "shadow_soft_size": 0.0}
+    return types.SimpleNamespace(name="lamp", data=types.SimpleNamespace(**(plain | light)), matrix_world=_Place())
+
+
+def test_watts_of_a_point_become_an_intensity(kit):
+    words = kit.lamp(_lamp(type="POINT"))
+    assert words["type"] == "point"
+    np.testing.assert_allclose(words["intensity_rgb"], np.array([100.0, 50.0, 25.0]) / (4.0 * math.pi))
+
+
+def test_a_soft_point_is_a_sphere_of_the_same_power(kit):
+    words = kit.lamp(_lamp(type="POINT", shadow_soft_size=0.3, exposure=1.0))
+    assert words["type"] == "sphere"
+    flux = np.array(words["radiance_rgb"]) * math.pi * 4.0 * math.pi * 0.3**2
+    np.testing.assert_allclose(flux, [200.0, 100.0, 50.0])
+
+
+@pytest.mark.parametrize("kind", ["AREA", "SPOT"])
+def test_a_lamp_that_a_scene_has_no_word_for_is_refused(kit, kind):
+    with pytest.raises(kit.Unsuited, match="suns, points and the world"):
+        kit.lamp(_lamp(type=kind))
+
+
+MAKE = """
+import bpy, sys
+from mathutils import Vector
+bpy.ops.wm.read_factory_settings(use_empty=True)
+scene = bpy.context.scene
+bpy.ops.mesh.primitive_cube_add(location=(4, 0, 0))
+bpy.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=128)
+ball = bpy.context.object
+bpy.ops.object.shade_smooth()
+exec(open(sys.argv[2]).read())
+bpy.ops.object.select_all(action="DESELECT")
+sun = bpy.data.lights.new("sun", "SUN")
+sun.energy, sun.angle = 3.0, 0.1
+lamp = bpy.data.objects.new("sun", sun)
+lamp.rotation_euler = Vector((2, -3, 2.4)).to_track_quat("Z", "Y").to_euler()
+eye = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))
+eye.data.lens, eye.location = 85, (0.8, -4.9, 0.6)
+eye.rotation_euler = Vector(eye.location).to_track_quat("Z", "Y").to_euler()
+for thing in (lamp, eye):
+    scene.collection.objects.link(thing)
+scene.camera = eye
+scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 72, 64, 100
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
+"""
+"""A scene as a user has it: a ball that the exported script gives its material, something beside it, a sun and a camera."""
+
+
+def test_cycles_draws_the_formula_that_is_fitted(tmp_path):
+    """All the way round: a material is exported, Blender builds it, the kit renders it, and the picture is that of the formula."""
+    python = os.environ.get("LAYERFIT_BPY")
+    if not python:
+        pytest.skip("LAYERFIT_BPY does not name a Python with bpy")
+    made = blender.engine_of(
+        blender.DEFAULTS
+        | {"Base Color": [0.9, 0.5, 0.4], "Metallic": 1.0, "Roughness": 0.45, "Specular Tint": [0.9, 0.8, 1.0]}
+        | {"Coat Weight": 1.0, "Coat Roughness": 0.3, "Coat IOR": 1.6, "Coat Tint": [0.8, 0.6, 0.3]}
+    )
+    files = {"make.py": MAKE, "paint.py": _script(made), "kit.py": formats.blender_kit()}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    run = lambda *words: subprocess.run([python, *map(str, words)], cwd=tmp_path, check=True, capture_output=True)  # noqa: E731
+    run("make.py", tmp_path / "user.blend", "paint.py")
+    run("kit.py", "--blend", "user.blend", "--object", "Sphere", "--output", tmp_path, "--samples", "64")
+    start = formats.read_start(tmp_path / "Sphere.principled.json")
+    assert float(start.layers[0].eta) == pytest.approx(1.6)
+    read = blender.read(tmp_path, json.loads((tmp_path / "Sphere.principled.json").read_text()))
+    (view,) = scene_views(tmp_path / "Sphere.toml")
+    values = draw(view, alone(read))
+    assert len(view.target) > 1000
+    assert np.sqrt(np.sum((values - view.target) ** 2) / np.sum(view.target**2)) < CYCLES
+
+
+def _script(made: Any) -> str:
+    from layerfit.interchange.convert import Conversion
+
+    stack = Stack((), Lambert(), formats.read_preset(Path("bare_wood")).form)
+    return blender.write(Conversion("paint", stack, made, {}, {}, "nowhere", (), ()))
