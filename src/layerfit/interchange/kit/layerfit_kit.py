@@ -95,9 +95,9 @@ def alone(scene, thing):
 def material(thing):
     """Inputs of its Principled BSDF, and what of them could not be read."""
     slot = thing.active_material
-    nodes = slot.node_tree.nodes if slot is not None and slot.node_tree is not None else ()
-    found = [node for node in nodes if node.type == "BSDF_PRINCIPLED"]
-    if not found:
+    tree = slot.node_tree if slot is not None else None
+    found = [node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"] if tree else []
+    if slot is None or not found:
         return {}, [f"{thing.name} has no Principled BSDF: the fit starts from Blender's defaults"]
     sockets = [found[0].inputs[name] for name in (*COLOURS, *NUMBERS, *COAT) if name in found[0].inputs]
     told = [
