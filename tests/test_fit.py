@@ -370,10 +370,11 @@ def test_the_scale_of_the_lights_is_fitted_where_it_is_named(see, model_error):
     free = ["coat.alpha", "coat.tau", "base.alpha", "light.scale"]
     result = fit([brighter], dataclasses.replace(START, layers=TRUTH.layers), free=free, starts=2, model_error=model_error)
     row = parameters(result)["light.scale"]
-    np.testing.assert_allclose(result.light, row["value"], rtol=1e-5)
+    (lit,) = result.lights
+    np.testing.assert_allclose(lit["scale"], row["value"], rtol=1e-5)
     assert np.all(np.abs(np.subtract(row["value"], scale)) < 4.0 * np.asarray(row["sigma"])), row
     assert np.all(np.asarray(row["sigma"]) < (0.3 if model_error else 0.1) * scale)
-    samples = view.relit(result.light).samples()
+    samples = view.relit(lit).samples()
     np.testing.assert_allclose(predict(result.stack, *samples.arrays[:3]), result.models[0], rtol=1e-4)
 
 

@@ -107,7 +107,7 @@ def options(cls: Any) -> str:
 
 
 def _default(field: Any) -> str:
-    if field.default is dataclasses.MISSING:
+    if field.default is dataclasses.MISSING or field.default == ():
         return "none"
     if field.default is None:
         return "left out"

@@ -9,13 +9,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
 from .capture.exr import write_exr
 from .capture.load import AnyView, load
 from .capture.measured.sphere import sphere_of
 from .capture.measured.view import MeasuredView
-from .capture.samples import QUADRATURE, Samples, View
+from .capture.samples import Samples, View
 from .capture.scene import Scene, read_scene
 from .documents import check_directory, finite, write_bytes, write_files
 from .errors import InputError
@@ -41,6 +42,9 @@ Progress = Callable[[str, float], None]
 
 PICTURE_SAMPLES = 40_000_000
 """Light samples in one picture at most, where light is a quadrature."""
+
+PORTION = 500_000
+"""Light samples that are drawn at a time: what stands for them in memory is some 150 bytes each."""
 
 QUADRATURE_PIXELS = 128
 """Pixels on which the error of a quadrature is measured: enough to say how large it is."""
@@ -90,8 +94,10 @@ def fit_scene(
     fitted = time.perf_counter()
     name = path.stem
     shader = print_material(result.stack, name)
-    compared, drawn = ([view.relit(result.light) for view in views] for views in (result.views, load(scene, 0.0)))
-    drawings = draw_all(compared, drawn, shader)
+    compared, drawn = (
+        [view.relit(lit) for view, lit in zip(views, result.lights, strict=True)] for views in (result.views, load(scene, 0.0))
+    )
+    drawings = draw_all(compared, drawn, shader, result.materials)
     parity = together([*(drawing.parity for drawing in drawings), check_pairs(shader)])
     verified = time.perf_counter()
     picture = pictures.strip([drawing.row() for drawing in drawings])
@@ -153,6 +159,8 @@ def fit_views(views: Sequence[AnyView], scene: Scene, **options: Any) -> FitResu
         views,
         scene.start,
         free=request.free,
+        also=request.also,
+        each=request.each,
         fixed=dict(request.fixed),
         metric=request.metric,
         loss=request.loss,
@@ -165,11 +173,11 @@ def fit_views(views: Sequence[AnyView], scene: Scene, **options: Any) -> FitResu
 
 def _planes(result: FitResult, name: str) -> bytes | None:
     """A measured BRDF and its fit in planes of incidence; None where there is none, or no samples lie in one."""
-    for view in result.views:
-        if isinstance(view, MeasuredView):
-            stack = scaled(result.stack, view.scales(result.stack))
-            if found := planes.planes(view.brdf, lambda wi, wo, stack=stack: brdf_values(stack, wi, wo)):
-                return planes.drawn(found, name)
+    for view, stack in zip(result.views, result.materials, strict=True):
+        if not isinstance(view, MeasuredView):
+            continue
+        if found := planes.planes(view.brdf, lambda wi, wo, stack=stack: brdf_values(stack, wi, wo)):
+            return planes.drawn(found, name)
     return None
 
 
@@ -196,13 +204,15 @@ def _why(stack: Stack) -> str:
 
 def _quadrature(result: FitResult) -> dict[str, Any] | None:
     """What sampling the lights costs in accuracy; None where every light is exact."""
-    sampled = [(v, s) for v, s in zip(result.views, result.samples, strict=True) if isinstance(v, View) and not v.exact]
+    every = zip(result.views, result.samples, result.materials, result.lights, strict=True)
+    sampled = [(v.relit(lit), s, stack) for v, s, stack, lit in every if isinstance(v, View)]
+    sampled = [(view, s, stack) for view, s, stack in sampled if not view.exact]
     if not sampled:
         return None
-    directions = [(_directions(view), s.wi.shape[1]) for view, s in sampled]
+    directions = [(_directions(view), s.wi.shape[1]) for view, s, _ in sampled]
     errors = [
-        [_quadrature_error(result.stack, view, count) for count in counts]
-        for (view, _), counts in zip(sampled, directions, strict=True)
+        [_quadrature_error(stack, view, count) for count in counts]
+        for (view, _, stack), counts in zip(sampled, directions, strict=True)
     ]
     rms, fit_rms = np.max(errors, 0)
     picture, fitted = np.min(directions, 0)
@@ -213,8 +223,7 @@ def _quadrature_error(stack: Stack, view: View, directions: int) -> float:
     """Error of one pixel's quadrature over the pixels' rms value: two draws, compared."""
     rng = np.random.default_rng(0)
     which = rng.choice(len(view.index), min(QUADRATURE_PIXELS, len(view.index)), replace=False)
-    thick = scaled(stack, view.scales(stack))
-    one, two = (predict(thick, *view.samples(which, directions, seed).arrays).astype(float) for seed in (1, 2))
+    one, two = (predict(stack, *view.samples(which, directions, seed).arrays).astype(float) for seed in (1, 2))
     return float(np.sqrt(np.mean((one - two) ** 2) / 2.0 / np.maximum(np.mean(one * two), 1e-30)))
 
 
@@ -257,18 +266,26 @@ class Drawing:
         return image_error(self.drawn.image(self.shader), target, self.compared.covered)
 
 
-def draw_all(compared: Sequence[AnyView], drawn: Sequence[AnyView], shader: Shader) -> list[Drawing]:
-    """Draw a material where references were seen, by JAX and by its shader in OpenGL."""
+def draw_all(
+    compared: Sequence[AnyView], drawn: Sequence[AnyView], shader: Shader, stacks: Sequence[Stack] | None = None
+) -> list[Drawing]:
+    """Draw a material where references were seen, by JAX and by its shader in OpenGL. `stacks` is the material as it is in each; left out, as thick
+    as the scene says."""
     drawings = []
-    for view, whole in zip(compared, drawn, strict=True):
-        view.check(shader.stack)
-        scale = view.scales(shader.stack)
-        thick = shader if scale is None else print_material(scaled(shader.stack, scale), shader.name)
+    stacks = [scaled(shader.stack, view.scales(shader.stack)) for view in compared] if stacks is None else stacks
+    for view, whole, stack in zip(compared, drawn, stacks, strict=True):
+        view.check(stack)
+        thick = shader if same(stack, shader.stack) else print_material(stack, shader.name)
         if isinstance(view, View) and isinstance(whole, View):
             drawings.append(draw(view, whole, thick))
         elif isinstance(view, MeasuredView):
             drawings.append(draw_measured(view, thick))
     return drawings
+
+
+def same(one: Stack, other: Stack) -> bool:
+    """Whether two materials of one structure are equal in all numbers."""
+    return all(np.array_equal(a, b) for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True))
 
 
 def draw(compared: View, drawn: View, shader: Shader) -> Drawing:
@@ -313,12 +330,12 @@ def mean_error(drawings: Sequence[Drawing]) -> dict[str, float]:
 
 def _directions(view: View) -> int:
     """Light samples of a pixel of a picture, for each light that is a quadrature."""
-    return 1 if view.exact else int(np.clip(PICTURE_SAMPLES // len(view.index), 64, QUADRATURE))
+    return 1 if view.exact else int(np.clip(PICTURE_SAMPLES // len(view.index), 64, view.directions))
 
 
 def _portions(view: View) -> Iterator[Samples]:
     """All usable pixels, a bounded number of light samples at a time."""
-    size = max(1, 2_000_000 // _directions(view))
+    size = max(1, PORTION // _directions(view))
     for start in range(0, len(view.index), size):
         yield view.samples(np.arange(start, min(start + size, len(view.index))), _directions(view))
 

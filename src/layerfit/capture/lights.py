@@ -33,6 +33,8 @@ class Received:
 
     to_light: np.ndarray
     weight: np.ndarray
+    source: np.ndarray
+    """(samples,) which of the lights each is of."""
 
 
 def is_exact(light: Light) -> "TypeIs[Directional | Point]":
@@ -53,22 +55,25 @@ def receive(
 
     `widths` are of the half vectors: those of the lobes that are looked at.
     """
-    rng = np.random.default_rng(seed)
+    # Each light its own numbers, and the same: two that are the same light everywhere then show as one.
+    rngs = [np.random.default_rng(seed) for _ in lights]
     size = max(1, CACHED // samples)
     blocks = [slice(start, start + size) for start in range(0, max(len(position), 1), size)]
-    rows = [_receive(lights, position[b], normal[b], view[b], samples, rng, widths) for b in blocks]
-    return Received(np.concatenate([r.to_light for r in rows]), np.concatenate([r.weight for r in rows]))
+    rows = [_receive(lights, position[b], normal[b], view[b], samples, rngs, widths) for b in blocks]
+    return Received(np.concatenate([r.to_light for r in rows]), np.concatenate([r.weight for r in rows]), rows[0].source)
 
 
-def _receive(lights, position, normal, view, samples, rng, widths) -> Received:
+def _receive(lights, position, normal, view, samples, rngs, widths) -> Received:
     parts = [
         _exact(light, position, normal) if is_exact(light) else _quadrature(light, position, normal, view, samples, rng, widths)
-        for light in lights
+        for light, rng in zip(lights, rngs, strict=True)
     ]
-    return Received(np.concatenate([p.to_light for p in parts], 1), np.concatenate([p.weight for p in parts], 1))
+    source = np.repeat(np.arange(len(parts)), [to_light.shape[1] for to_light, _ in parts])
+    to_light, weight = (np.concatenate(arrays, 1) for arrays in zip(*parts, strict=True))
+    return Received(to_light, weight, source)
 
 
-def _exact(light: Directional | Point, position: np.ndarray, normal: np.ndarray) -> Received:
+def _exact(light: Directional | Point, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if isinstance(light, Directional):
         to_light = np.broadcast_to(light.to_light, position.shape)
         intensity = np.broadcast_to(light.irradiance_rgb, position.shape)
@@ -78,7 +83,7 @@ def _exact(light: Directional | Point, position: np.ndarray, normal: np.ndarray)
         to_light = away / np.sqrt(distance2)
         intensity = np.asarray(light.intensity_rgb) / distance2
     cosine = np.maximum(np.sum(normal * to_light, -1, keepdims=True), 0.0)
-    return Received(to_light[:, None], (intensity * cosine)[:, None])
+    return to_light[:, None], (intensity * cosine)[:, None]
 
 
 def _quadrature(
@@ -89,7 +94,7 @@ def _quadrature(
     samples: int,
     rng: np.random.Generator,
     widths: tuple[float, ...],
-) -> Received:
+) -> tuple[np.ndarray, np.ndarray]:
     n = len(position)
     strategies = 1 + len(widths) + (not isinstance(light, Constant))
     each = max(1, samples // strategies)
@@ -115,7 +120,7 @@ def _quadrature(
     cosine = wi[..., 2]
     radiance = _radiance(light, position, to_light)
     scale = np.where((cosine > 0.0) & (mixture > 0.0), cosine / np.where(mixture > 0.0, mixture * each, 1.0), 0.0)
-    return Received(to_light, radiance * scale[..., None])
+    return to_light, radiance * scale[..., None]
 
 
 def _points(n: int, count: int, rng: np.random.Generator) -> np.ndarray:

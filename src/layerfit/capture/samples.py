@@ -14,7 +14,7 @@ from .exr import read_exr
 from .geometry import Surface, frames, normalise, sphere_surface, sphere_tangent, sphere_uv
 from .lights import is_exact, receive
 from .png import read_png
-from .scene import Reference, brighter
+from .scene import Constant, Lit, Reference, brighter, factor
 
 QUADRATURE = 992
 """Directions a pixel for light that is not a point: a pixel is off by 1 % (rms) under the studio map of the examples, with a coat of width .1."""
@@ -49,6 +49,15 @@ class Samples:
     place: Place | None = None
     """Where on the surface each pixel is: texture coordinates (pixels, 2) where there are any, distance to the camera
     and part of the sky that is seen, both (pixels,)."""
+    lights: tuple[str, ...] = ()
+    """Name of the light that each sample is of, (samples,); empty for a measured BRDF."""
+
+    def relit(self, lit: Lit) -> "Samples":
+        """The same under lights that are as bright."""
+        if not lit:
+            return self
+        scale = np.stack([factor(name, lit) for name in self.lights]).astype(np.float32)
+        return dataclasses.replace(self, weight=self.weight * scale)
 
     @property
     def turn(self) -> np.ndarray:
@@ -139,10 +148,16 @@ class View:
         """Thickness of each layer in this image over that of the material, the base last, or None where all are 1."""
         return layer_scales(self.reference.thickness_scale, stack)
 
-    def relit(self, scale: np.ndarray) -> "View":
-        """The same view under lights that are `scale` (3,) times as bright."""
+    @property
+    def directions(self) -> int:
+        """Light samples a pixel of a quadrature: the same radiance from everywhere takes an eighth of what a map does."""
+        plain = all(is_exact(light) or isinstance(light, Constant) for light in self.reference.lights)
+        return QUADRATURE // 8 if plain else QUADRATURE
+
+    def relit(self, lit: Lit) -> "View":
+        """The same view under lights that are as bright, and the ambient one that there may be."""
         return dataclasses.replace(
-            self, reference=dataclasses.replace(self.reference, lights=brighter(self.reference.lights, scale))
+            self, reference=dataclasses.replace(self.reference, lights=brighter(self.reference.lights, lit))
         )
 
     def moved(self, which: np.ndarray, dx: float, dy: float) -> "View":
@@ -180,6 +195,7 @@ class View:
             index=self.index[which],
             shape=self.shape,
             place=self._place(which),
+            lights=tuple(self.reference.lights[k].name for k in received.source),
         )
 
     def _place(self, which: np.ndarray) -> Place:

@@ -47,6 +47,7 @@ class Directional:
 
     to_light: Vector
     irradiance_rgb: Vector
+    name: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,6 +56,7 @@ class Point:
 
     position: Vector
     intensity_rgb: Vector
+    name: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,6 +64,7 @@ class Constant:
     """The same radiance from everywhere."""
 
     radiance_rgb: Vector
+    name: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,6 +74,7 @@ class SphereLight:
     center: Vector
     radius: float
     radiance_rgb: Vector
+    name: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,6 +89,7 @@ class EnvironmentMap:
     scale: Vector = (1.0, 1.0, 1.0)
     up: str = "y"
     rows: str = "centre"
+    name: str = ""
 
 
 Light = Directional | Point | Constant | SphereLight | EnvironmentMap
@@ -99,11 +104,29 @@ BRIGHTNESS = {
 """What says how bright a light is."""
 
 
-def brighter(lights: tuple[Light, ...], scale: Any) -> tuple[Light, ...]:
-    """The same lights, `scale` (3,) times as bright."""
+AMBIENT = "ambient"
+"""The name of light from everywhere that a scene does not tell of, and a fit may find."""
+
+WHOLE = "scale"
+"""What all lights are multiplied by, but the ambient one."""
+
+Lit = Mapping[str, Any]
+"""How bright lights are, over what a scene says of them, by their name or `WHOLE`; of the ambient one the radiance. Each a number a channel."""
+
+
+def factor(name: str, lit: Lit) -> Any:
+    """What a light of this name is multiplied by, (3,)."""
+    if name == AMBIENT:
+        return lit.get(AMBIENT, np.zeros(3, np.float32))
+    return lit.get(name, np.ones(3, np.float32)) * lit.get(WHOLE, np.float32(1.0))
+
+
+def brighter(lights: tuple[Light, ...], lit: Lit) -> tuple[Light, ...]:
+    """The same lights as bright as they are, with the ambient one that there may be."""
+    known = (*lights, Constant((1.0, 1.0, 1.0), AMBIENT)) if AMBIENT in lit else lights
     return tuple(
-        dataclasses.replace(light, **{name: tuple(np.multiply(getattr(light, name), scale).tolist())})
-        for light in lights
+        dataclasses.replace(light, **{name: tuple(np.multiply(getattr(light, name), factor(light.name, lit)).tolist())})
+        for light in known
         for name in [BRIGHTNESS[type(light)]]
     )
 
@@ -155,6 +178,10 @@ class FitRequest:
     """What the scene file asks of the fit."""
 
     free: tuple[str, ...] | None = None
+    also: tuple[str, ...] = ()
+    """Parameters that are fitted beside those."""
+    each: tuple[str, ...] = ()
+    """Parameters that are fitted for each reference apart."""
     fixed: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     loss: str = "square"
     min_cosine: float = 0.1
@@ -265,10 +292,11 @@ def _fit(table: Any, where: str) -> FitRequest:
         if "metric" in values:
             raise InputError(f"{where}: weights is a former name of metric; give metric alone")
         values["metric"] = values.pop("weights")
-    if "free" in values:
-        if not isinstance(values["free"], list) or not all(isinstance(v, str) for v in values["free"]):
-            raise InputError(f'{where}.free: should be a list of parameters such as "coat.alpha"')
-        values["free"] = tuple(values["free"])
+    for key in ("free", "also", "each"):
+        if key in values:
+            if not isinstance(values[key], list) or not all(isinstance(v, str) for v in values[key]):
+                raise InputError(f'{where}.{key}: should be a list of parameters such as "coat.alpha"')
+            values[key] = tuple(values[key])
     for key, known in (("loss", LOSSES), ("metric", METRICS)):
         if values.get(key, known[0]) not in known:
             raise InputError(
@@ -319,9 +347,9 @@ def _light(table: Any, path: Path, where: str) -> Light:
     if not isinstance(kind, str) or kind not in _LIGHTS or not isinstance(table, Mapping):
         raise InputError(f"{where}.type = {kind!r}: should be one of {', '.join(_LIGHTS)}{nearest(str(kind), _LIGHTS)}")
     cls, readers = _LIGHTS[kind]
-    check_keys(table, ("type", *readers), where)
+    check_keys(table, ("type", "name", *readers), where)
     needed = {f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING}
-    values = {}
+    values: dict[str, Any] = {"name": _light_name(table["name"], f"{where}.name")} if "name" in table else {}
     for key, reader in readers.items():
         if key in table:
             values[key] = reader(table[key], f"{where}.{key}")
@@ -331,6 +359,14 @@ def _light(table: Any, path: Path, where: str) -> Light:
     if "file" in values:
         values["file"] = path.parent / values["file"]
     return cls(**values)
+
+
+def _light_name(value: Any, where: str) -> str:
+    if not isinstance(value, str) or not value.isidentifier() or value in (AMBIENT, WHOLE):
+        raise InputError(
+            f"{where} = {value!r}: should be letters, digits and underscores, and neither {AMBIENT!r} nor {WHOLE!r}, which have a meaning"
+        )
+    return value
 
 
 def _need(table: Mapping[str, Any], key: str, where: str) -> Any:

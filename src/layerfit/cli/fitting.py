@@ -29,6 +29,16 @@ def fit(
             help="Material to start from in place of the scene's: .gltf, .glb, .mtlx, a preset, or Blender's inputs (.json)."
         ),
     ] = None,
+    also: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--also", help="Parameter to fit beside those that the scene names, such as light.ambient; may be repeated."
+        ),
+    ] = None,
+    each: Annotated[
+        list[str] | None,
+        typer.Option("--each", help="Parameter that every reference has for itself, such as base.alpha; may be repeated."),
+    ] = None,
     profile: Annotated[
         list[str] | None,
         typer.Option(
@@ -62,6 +72,8 @@ def fit(
             progress=report,
             profile=profile or (),
             force=force,
+            also=tuple(also) if also else None,
+            each=tuple(each) if each else None,
             starts=starts,
             seed=seed,
             metric=metric,

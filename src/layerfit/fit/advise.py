@@ -19,8 +19,9 @@ from ..capture.scene import Constant, Directional, Reference, Scene
 from ..errors import InputError
 from ..stack import Stack
 from .blocks import STRATA, arrange, strata
-from .parameters import Parametrisation, parametrise, with_fixed
-from .residuals import Residuals, depths
+from .nuisances import depths
+from .parameters import LIGHT, Parametrisation, known_parameters, parametrise, with_fixed
+from .residuals import Residuals
 from .uncertainty import WEAK_SIGMA
 from .weights import FLOOR_SHARE, MODEL_SHARE, brightness, noise_law
 
@@ -118,7 +119,9 @@ def advise(
             f"{scene.path}: advice is for renders, which have lights and a camera; this scene has measured BRDFs alone"
         )
     stack = with_fixed(scene.start if stack is None else stack, scene.fit.fixed, f"{where}.fixed")
-    stack, free = parametrise(stack, scene.fit.free, tuple(scene.fit.fixed), where)
+    told = {*known_parameters(stack), LIGHT}
+    asked = scene.fit.free and [name for name in scene.fit.free if name in told]
+    stack, free = parametrise(stack, asked, tuple(scene.fit.fixed), where)
     with jax.enable_x64(True):
         ask = _Asked(scene, stack, free, seed)
         capture = [ask.told(reference) for reference in references]

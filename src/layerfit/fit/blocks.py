@@ -32,6 +32,8 @@ class Blocks:
     """Where the pixels are on the surface; absent where the material is the same everywhere, or is fitted by its mean."""
     curve: Any = None
     """What model and target are brought to before they are compared; absent where their values are."""
+    lights: Any = None
+    """(blocks, s) by the name of a light: 1 where a sample is of it; absent where they are known, or known but for one scale."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,8 +84,11 @@ LEAST = 16
 """Blocks that there is room for at least. Room for a power of two of them: a compiled step serves all images up to the same."""
 
 
-def arrange(references: list[Samples], seed: int, needs: tuple[str, ...] = ()) -> tuple[Blocks, Layout]:
-    """Blocks of all references, with weights of 0; `needs` is what the material has to know of the place of a pixel.
+def arrange(
+    references: list[Samples], seed: int, needs: tuple[str, ...] = (), names: tuple[str, ...] = ()
+) -> tuple[Blocks, Layout]:
+    """Blocks of all references, with weights of 0; `needs` is what the material has to know of the place of a pixel, `names` are all those of the
+    lights, where their samples have to be known.
 
     The references take turns, block by block.
     """
@@ -121,7 +126,14 @@ def arrange(references: list[Samples], seed: int, needs: tuple[str, ...] = ()) -
     of = np.array([k for k, _ in rows], np.int32)
     place = Place(**{name: held(values) for name, values in where.items()}) if where else None
     even = held(np.zeros_like(target))
-    return Blocks(held(wi), held(wo), held(weight), held(target), even, held(of), place), layout
+    source = {name: held(np.stack([_of(name, references[k], lights) for k in of])) for name in names} or None
+    return Blocks(held(wi), held(wo), held(weight), held(target), even, held(of), place, lights=source), layout
+
+
+def _of(name: str, samples: Samples, count: int) -> np.ndarray:
+    """1 for those of `count` light samples that are of this light."""
+    here = np.array([light == name for light in samples.lights], np.float32)
+    return np.pad(here, (0, count - len(here)))
 
 
 def weighted(blocks: Blocks, layout: Layout, weights: list[np.ndarray]) -> Blocks:

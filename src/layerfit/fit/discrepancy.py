@@ -19,7 +19,6 @@ from ..capture.load import AnyView
 from ..capture.samples import Samples, View
 from ..render import brdf_values
 from ..stack import Stack
-from .residuals import scaled
 from .uncertainty import newton
 
 PAIRS = 512
@@ -58,7 +57,7 @@ def begin(stack: Stack) -> None:
 
 
 def measure(
-    stack: Stack,
+    stacks: Sequence[Stack],
     views: Sequence[AnyView],
     samples: Sequence[Samples],
     place: tuple[np.ndarray, np.ndarray],
@@ -67,12 +66,12 @@ def measure(
     gram: np.ndarray,
     seed: int,
 ) -> Discrepancy:
-    """Ask the random walk what the form of a fitted material is off by, and the fit what that makes of its parameters.
+    """Ask the random walk what the form of a fitted material, as it is in each reference, is off by, and the fit what that makes of its parameters.
 
     `place` has the reference and the pixel of each row of `jacobian` (rows, channels, parameters) and `inverse_sigma` (rows, channels), -1
     for rows that do not count; `gram` is J^T J. A bare surface has no error: it is exact.
     """
-    if not stack.layers:
+    if not stacks[0].layers:
         return Discrepancy(np.zeros(len(gram)), np.zeros(len(gram)), np.zeros(3))
     rng = np.random.default_rng(seed)
     chance = _chance(jacobian, gram, place[0] >= 0)
@@ -81,7 +80,7 @@ def measure(
     for k, (view, seen) in enumerate(zip(views, samples, strict=True)):
         here = place[0][drawn] == k
         if here.any():
-            off[here] = _off(scaled(stack, view.scales(stack)), view, seen, place[1][drawn[here]], rng)
+            off[here] = _off(stacks[k], view, seen, place[1][drawn[here]], rng)
             exact[here] = view.exact
     off *= inverse_sigma[drawn]
     pull = np.einsum("pci,pc->pi", jacobian[drawn], off) / chance[drawn, None]

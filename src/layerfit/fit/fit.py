@@ -10,13 +10,13 @@ import numpy as np
 
 from .._compiled import CLOCK
 from ..capture.load import AnyView
-from ..capture.samples import View
 from ..capture.scene import METRICS
 from ..documents import nearest
 from ..errors import InputError
 from ..stack import Stack
 from . import discrepancy
-from .parameters import LIGHT, parametrise, with_fixed
+from .nuisances import THICKNESS
+from .parameters import parametrise, with_fixed
 from .problem import Problem
 from .profile import ABSORBING, Profile, along, deep, lower_limit, scatter, threshold
 from .residuals import NEAR
@@ -37,6 +37,8 @@ def fit(
     start: Stack,
     *,
     free: Sequence[str] | None = None,
+    also: Sequence[str] = (),
+    each: Sequence[str] = (),
     fixed: dict[str, Any] | None = None,
     metric: str = "law",
     loss: str = "square",
@@ -49,7 +51,8 @@ def fit(
 ) -> FitResult:
     """Fit the free parameters of `start` to the references.
 
-    `free` are names such as "coat.alpha" (left out: what an image can tell), `fixed` are values by name. `metric` is "law", "uniform",
+    `free` are names such as "coat.alpha" (left out: what an image can tell), `also` are further ones, such as "light.ambient", `each` those that
+    every reference has for itself, `fixed` are values by name. `metric` is "law", "uniform",
     "relative", "log" or "cube_root" (see `difference`), `loss` "square", "huber" or "cauchy". `starts` space-filling starts are tried beside
     the given one, all coarsely on few pixels, the best places that they reach to the end. With `model_error` sigmas hold what the form of the
     model gets wrong, too: a random walk tells it, at the fitted material (see `discrepancy`). `profile` are names of parameters whose intervals
@@ -58,15 +61,19 @@ def fit(
     if metric not in METRICS:
         raise InputError(f"{where}.metric = {metric!r}: should be one of {', '.join(METRICS)}{nearest(metric, METRICS)}")
     with jax.enable_x64(True):
-        return _Fit(views, start, free, fixed or {}, metric, loss, starts, seed, model_error, profile, where, progress).run()
+        return _Fit(
+            views, start, free, also, each, fixed or {}, metric, loss, starts, seed, model_error, profile, where, progress
+        ).run()
 
 
 class _Fit:
-    def __init__(self, views, start, free, fixed, metric, loss, starts, seed, model_error, profile, where, progress):
+    def __init__(
+        self, views, start, free, also, each, fixed, metric, loss, starts, seed, model_error, profile, where, progress
+    ):
         start = with_fixed(start, fixed, f"{where}.fixed")
         self.explicit = free is not None
         free, self.held = _without_gauge(start, free, views)
-        start, free = parametrise(start, free, tuple(fixed), where)
+        start, free = parametrise(start, free, tuple(fixed), where, views, also, each)
         names = [f.name for f in free.free]
         if unknown := [name for name in profile if name not in names]:
             raise InputError(
@@ -74,11 +81,13 @@ class _Fit:
             )
         for view in views:
             view.check(start)
-            if LIGHT in names and not isinstance(view, View):
-                raise InputError(f"{where}.free: {view.reference.path} is a measured BRDF and has no lights; leave {LIGHT} out")
         self.starts, self.seed, self.where = starts, seed, where
         self.model_error, self.profile, self.progress = model_error, profile, progress
-        self.notes: list[str] = []
+        self.notes: list[str] = [
+            f"only ratios of thickness show: {f.name} was held at {f.told:g}, and the others are over it"
+            for f in free.held
+            if f.field == THICKNESS
+        ]
         self.clock = dataclasses.replace(CLOCK)
         self.problem = Problem(views, start, free, metric, loss, seed)
 
@@ -103,7 +112,8 @@ class _Fit:
         clock = CLOCK.since(self.clock)
         return FitResult(
             stack=problem.material(u),
-            light=problem.light(u),
+            materials=problem.materials(u),
+            lights=problem.lights(u),
             start=problem.start,
             free=problem.free,
             vector=u,
@@ -146,9 +156,10 @@ class _Fit:
         """Starts: the given one, and the best of many space-filling ones. What has no effect at any of them is held."""
         problem = self.problem
         drawn = space_filling(problem.free, SCREENED * (self.starts - 1), self.seed)
-        (_, effect), *looked = problem.look([problem.free.pack(problem.start), *drawn], count)
+        first = problem.free.pack(problem.start)
+        (_, effect), *looked = problem.look([first, *drawn], count)
         order = np.argsort([cost for cost, _ in looked], kind="stable")[: self.starts - 1]
-        points = [problem.free.pack(problem.start), *(drawn[k] for k in order)]
+        points = [first, *(drawn[k] for k in order)]
         effects = [effect, *(looked[k][1] for k in order)]
         seen = [effect > 1e-7 * effect.max() for effect in effects if effect is not None]
         if not seen:
@@ -158,10 +169,10 @@ class _Fit:
         told = np.any(seen, 0)
         kept = [f for f in problem.free.free if np.any(told[list(f.slots)])]
         slots = [slot for f in kept for slot in f.slots]
-        self._hold([f.name for f in problem.free.free if f not in kept])
+        self._hold([f.name for f in problem.free.free if f not in kept], first)
         return [point[slots] for point in points]
 
-    def _hold(self, blind: Sequence[str]) -> None:
+    def _hold(self, blind: Sequence[str], first: np.ndarray) -> None:
         """Hold what has no effect on these images, with a reason; a parameter that the user asked for by name is an error."""
         if not blind:
             return
@@ -171,8 +182,9 @@ class _Fit:
                 f"{'it' if len(blind) == 1 else 'them'} out, or start where there is one (a base below an opaque coat has none)"
             )
         self.notes.append(f"{_have_no_effect(blind)} and {'was' if len(blind) == 1 else 'were'} held at the start")
-        left = [f.name for f in self.problem.free.free if f.name not in blind]
-        self.problem.release(*parametrise(self.problem.start, left, (), self.where))
+        if len(blind) == len(self.problem.free.free):
+            raise InputError(f"{self.where}.free: nothing is left to fit")
+        self.problem.release(self.problem.start, self.problem.free.without(blind, first))
 
     def _settled(self, minima: list[Minimum]) -> list[Minimum]:
         """The same where it takes all pixels, and weights that follow the model, to say which is best."""
@@ -208,7 +220,7 @@ class _Fit:
         unexplained, even = 0.5 * misfit**2 * problem.shine(), 2.0 * best.cost / residuals
         asked = [slot for f in problem.free.free if f.name in self.profile for slot in f.slots]
         deeper = [
-            slot for slot in deep(problem.free.free, problem.material(best.vector), uncertainty.sigma) if slot not in asked
+            slot for slot in deep(problem.free.free, problem.materials(best.vector), uncertainty.sigma) if slot not in asked
         ]
         hides = {
             slot: form[k] if len(f.slots) == 3 else form.sum() for f in problem.free.free for k, slot in enumerate(f.slots)
@@ -240,7 +252,8 @@ class _Fit:
                 opaque = np.array(best.vector)
                 opaque[list(f.slots)] = problem.bounds[1][list(f.slots)]
                 if problem.refit(opaque, f.slots).cost - best.cost < limit:
-                    return [below.name for below in problem.free.free if below.layer is not None and below.layer > f.layer]
+                    hidden = [g for g in problem.free.free if g.layer is not None and g.layer > f.layer]
+                    return [g.name for g in hidden if f.reference is None or g.reference == f.reference]
         return []
 
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..capture.load import AnyView
-from ..capture.samples import QUADRATURE, Samples
+from ..capture.samples import Samples
 from ..errors import InputError
 from ..stack import Stack
-from .residuals import depths
+from .nuisances import depths
 
 PIXELS = 65536
 """Pixels that a fit uses at most, all references together: more of them do not change the answer by what it can be wrong by."""
@@ -16,13 +16,15 @@ PIXELS = 65536
 EVALUATIONS = 250_000
 """BRDF evaluations that a step may take where light is a quadrature: it decides how many pixels are used."""
 
-DIRECTIONS = QUADRATURE // 2
-"""Light samples a pixel of a quadrature: its error is drawn anew for each pixel, so that few hundred of them average it out."""
+
+def directions(view: AnyView) -> int:
+    """Light samples a pixel of a quadrature: half of a picture's. Its error is drawn anew for each pixel, so that it averages out."""
+    return view.directions // 2
 
 
 def chosen(view: AnyView, views: int, seed: int) -> np.ndarray:
     """Pixels of a reference that the fit uses: all, or as many as it can afford, at random."""
-    most = max(128, (PIXELS if view.exact else EVALUATIONS // DIRECTIONS) // views)
+    most = max(128, (PIXELS if view.exact else EVALUATIONS // directions(view)) // views)
     total = len(view.index)
     if total <= most:
         return np.arange(total)

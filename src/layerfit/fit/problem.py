@@ -11,12 +11,13 @@ from .. import render
 from .._place import narrowed
 from ..capture.load import AnyView
 from ..capture.samples import Samples
+from ..capture.scene import AMBIENT, WHOLE, Lit
 from ..stack import Stack
 from . import discrepancy
 from .blocks import arrange, channels_first, held, weighted
 from .difference import compared, curve, slope
 from .parameters import Parametrisation
-from .pixels import DIRECTIONS, chosen, scales, sectors
+from .pixels import chosen, directions, scales, sectors
 from .residuals import NEAR, Residuals, initial, scaled
 from .result import Row
 from .solve import LONGEST
@@ -38,8 +39,9 @@ class Problem:
         self.views, self.metric, self.loss = views, metric, loss
         self.trace: list[Row] = []
         self.began = time.perf_counter()
-        self.samples = [view.samples(chosen(view, len(views), seed), DIRECTIONS, seed) for view in views]
-        self.blocks, self.layout = arrange(self.samples, seed, start.needs)
+        sampled = [view.relit({AMBIENT: np.ones(3)}) for view in views] if AMBIENT in lights_of(free) else views
+        self.samples = [view.samples(chosen(view, len(views), seed), directions(view), seed) for view in sampled]
+        self.blocks, self.layout = arrange(self.samples, seed, start.needs, told_apart(free, self.samples))
         self.scale = scales(views, start)
         self.curves = [curve(metric, brightness(s.target)) for s in self.samples]
         if self.curves[0]:
@@ -137,20 +139,32 @@ class Problem:
         return values
 
     def models(self, u: np.ndarray, samples: Sequence[Samples]) -> list[np.ndarray]:
-        stack, light = self.material(u), self.light(u)
+        relit = [s.relit(lit) for s, lit in zip(samples, self.lights(u), strict=True)]
         return [
-            light * render.predict(scaled(stack, view.scales(stack)), s.wi, s.wo, s.weight, narrowed(s.place, stack.needs))
-            for view, s in zip(self.views, samples, strict=True)
+            render.predict(stack, s.wi, s.wo, s.weight, narrowed(s.place, stack.needs))
+            for stack, s in zip(self.materials(u), relit, strict=True)
         ]
 
     def material(self, u: np.ndarray) -> Stack:
+        """The material that references share; of what they have for themselves, that of the first."""
         stack = self.free.put(self.start, self.free.fields(u), np)
         return jax.tree.map(lambda a: np.asarray(a, np.float32), stack)
 
-    def light(self, u: np.ndarray) -> np.ndarray:
-        """All lights over what the scene says of them, (3,)."""
-        found = self.free.light(self.free.fields(u), np)
-        return np.ones(3, np.float32) if found is None else found.astype(np.float32)
+    def materials(self, u: np.ndarray) -> list[Stack]:
+        """The material as it is in each reference, as thick as it is there."""
+        return [self._there(np.asarray(u), k, view) for k, view in enumerate(self.views)]
+
+    def _there(self, u: np.ndarray, reference: int, view: AnyView) -> Stack:
+        part = self.free.part
+        fields = part.fields(self.free.taken(u, reference, np))
+        stack = part.put(self.start, fields, np)
+        thick = scaled(stack, part.thickness(fields, view.scales(stack), len(stack.layers) + 1, np))
+        return jax.tree.map(lambda a: np.asarray(a, np.float32), thick)
+
+    def lights(self, u: np.ndarray) -> list[Lit]:
+        """How bright the lights of each reference are."""
+        part = self.free.part
+        return [part.light(part.fields(self.free.taken(np.asarray(u), k, np)), np) for k in range(len(self.views))]
 
     def descend(
         self, at: Sequence[Minimum], stage: str, most: int, count: int | None = None, trust: float = NEAR
@@ -191,13 +205,24 @@ class Problem:
         place = self.layout.reference.ravel(), self.layout.pixel.ravel()
         slopes = self.layout.scatter([slope(m, by) for m, by in zip(models, self.curves, strict=True)], 0.0).reshape(-1, 3)
         weights = self.inverse_sigma.reshape(-1, 3)
-        return discrepancy.measure(
-            self.material(u), self.views, self.samples, place, jacobian, slopes * weights * self.light(u), gram, seed
-        )
+        lit = self.lights(u)
+        views = [view.relit(by) for view, by in zip(self.views, lit, strict=True)]
+        samples = [s.relit(by) for s, by in zip(self.samples, lit, strict=True)]
+        return discrepancy.measure(self.materials(u), views, samples, place, jacobian, slopes * weights, gram, seed)
 
     def sectors(self) -> np.ndarray:
         """Sector of the image that each pixel of the blocks is in, around the highlight: each has its share of every half angle."""
         return self.layout.scatter([sectors(samples, GROUPS) for samples in self.samples], -1.0).ravel()
+
+
+def lights_of(free: Parametrisation) -> set[str]:
+    """What is fitted of the lights: `WHOLE`, `AMBIENT`, or their names."""
+    return {f.field for f in free.free if f.layer is None}
+
+
+def told_apart(free: Parametrisation, samples: Sequence[Samples]) -> tuple[str, ...]:
+    """Names of the lights whose samples have to be known: all of them, where one is fitted by its name."""
+    return tuple(sorted({name for s in samples for name in s.lights})) if lights_of(free) - {WHOLE} else ()
 
 
 class _Descent:

@@ -141,11 +141,12 @@ def _held(u: np.ndarray, slot: int, value: float) -> np.ndarray:
     return np.where(np.arange(len(u)) == slot, value, u)
 
 
-def deep(free: tuple[Free, ...], stack: Stack, sigma: np.ndarray) -> list[int]:
-    """Entries of the vector that are optical depths so large, or known so badly, that the base may not be seen."""
-    layers = (*stack.layers, stack.base)
+def deep(free: tuple[Free, ...], stacks: Sequence[Stack], sigma: np.ndarray) -> list[int]:
+    """Entries of the vector that are optical depths so large, or known so badly, that the base may not be seen; `stacks` are the
+    material in each reference."""
     slots = []
     for f in free:
+        layers = (*stacks[f.reference or 0].layers, stacks[f.reference or 0].base)
         if (
             f.layer is not None
             and f.field in ABSORBING

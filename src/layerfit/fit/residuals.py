@@ -1,6 +1,7 @@
 """Residuals of a material against blocks of samples, and the compiled descent of a fit."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import jax
@@ -9,16 +10,13 @@ import numpy as np
 from jax import lax
 
 from .._compiled import Compiled
+from ..capture.scene import WHOLE, Lit, factor
 from ..render import shade
 from ..stack import Stack
 from .blocks import Blocks
+from .nuisances import depths
 from .parameters import Parametrisation
 from .solve import LONGEST, SOLVER, columns, dense, descend, normal_equations, products, tangents
-
-
-def depths(layer: Any) -> list[str]:
-    """Fields of a layer that grow with its thickness; of several layers of pigment, those of the outermost."""
-    return [name for name in ("thickness_um", "tau", "tau_s", "kx", "sx") if getattr(layer, name, None) is not None]
 
 
 def scaled(stack: Stack, scale: Any) -> Stack:
@@ -33,10 +31,12 @@ def scaled(stack: Stack, scale: Any) -> Stack:
 
 
 def _material(u: Any, start: Stack, scale: Any, *, free: Parametrisation) -> tuple[Any, Any]:
-    """The material at `u`, prepared, with what the lights are multiplied by; and the derivatives of both."""
+    """The material of a reference at `u`, prepared, with how bright its lights are; and the derivatives of both."""
 
     def made(fields: Any) -> Any:
-        return scaled(free.put(start, fields).astype(u.dtype), scale).prepare(), free.light(fields)
+        stack = free.put(start, fields).astype(u.dtype)
+        thickness = free.thickness(fields, scale, len(stack.layers) + 1)
+        return scaled(stack, thickness).prepare(), free.light(fields)
 
     return tangents(made, free.fields(u))
 
@@ -45,9 +45,11 @@ def _columns(material: tuple[Any, Any], block: Blocks, *, form: Any) -> Any:
     """The model's derivatives and residual over one block of pixels, in the precision of the block."""
 
     def residual(made: Any) -> Any:
-        prepared, light = made
-        model = shade(prepared, block.wi, block.wo, block.weight, block.place, form=form)
-        model = model if light is None else model * light[:, None]
+        prepared, lit = made
+        weight = block.weight if block.lights is None else block.weight * _bright(block.lights, lit)[:, None]
+        model = shade(prepared, block.wi, block.wo, weight, block.place, form=form)
+        if lit and block.lights is None:
+            model = model * lit[WHOLE][:, None]
         if block.curve is None:
             return (model - block.target) * block.inverse_sigma
         return (block.curve(model) - block.curve(block.target)) * block.inverse_sigma
@@ -55,35 +57,44 @@ def _columns(material: tuple[Any, Any], block: Blocks, *, form: Any) -> Any:
     return columns(residual, *material)
 
 
+def _bright(lights: Mapping[str, Any], lit: Lit) -> Any:
+    """What the samples of lights are multiplied by, (3, samples)."""
+    return sum(factor(name, lit)[:, None] * here for name, here in lights.items())
+
+
 def _descend(
     u: Any, state: Any, bounds: Any, start: Stack, scale: Any, blocks: Blocks, count: Any, most: Any, *, free: Parametrisation
 ) -> Any:
     """The solver over the first `count` blocks; see `solve.descend`. Kept are the columns of the last evaluation."""
-    slots = tuple(f.slots for f in free.free)
-    fields, dtype = len(slots) + 1, blocks.wi.dtype
+    fields, dtype = len(free.part.free) + 1, blocks.wi.dtype
+    alike = scale is None and not free.apart
 
     def evaluate(u: Any, kept: Any) -> Any:
-        u = u.astype(dtype)
-        # References of other thickness are made of other materials.
-        made = (
-            _material(u, start, None, free=free)
-            if scale is None
-            else lax.map(lambda s: _material(u, start, s, free=free), scale.astype(dtype))
-        )
+        made = _materials(u.astype(dtype), start, None if scale is None else scale.astype(dtype), free)
 
         def add(k: Any, sums: Any) -> Any:
             total, kept = sums
             block = jax.tree.map(lambda a: a[k], blocks)
-            found = _columns(made if scale is None else jax.tree.map(lambda a: a[block.of], made), block, form=start.form)
-            return total + products(found), lax.dynamic_update_index_in_dim(kept, found, k, 0)
+            found = _columns(made if alike else jax.tree.map(lambda a: a[block.of], made), block, form=start.form)
+            part = block.of if free.apart else 0
+            return total.at[part].add(products(found)), lax.dynamic_update_index_in_dim(kept, found, k, 0)
 
-        total, kept = lax.fori_loop(0, count, add, (jnp.zeros((3, fields, fields)), kept))
-        return normal_equations(total, slots), kept
+        total, kept = lax.fori_loop(0, count, add, (jnp.zeros((len(free.slots), 3, fields, fields)), kept))
+        parts = [normal_equations(products, slots, free.size) for products, slots in zip(total, free.slots, strict=True)]
+        return jax.tree.map(lambda *values: sum(values), *parts), kept
 
     size, channels, pixels = blocks.target.shape
     kept = jnp.zeros((size, fields, channels, pixels), dtype)
     u, state, losses, kept = descend(SOLVER, evaluate, u, state, bounds, most, kept)
     return u, jax.tree.leaves(state), losses, kept
+
+
+def _materials(u: Any, start: Stack, scale: Any, free: Parametrisation) -> tuple[Any, Any]:
+    """`_material` of every reference, where they are not the same."""
+    if scale is None and not free.apart:
+        return _material(u, start, None, free=free)
+    vectors = jnp.stack([free.taken(u, k) for k in range(len(free.slots) if scale is None else len(scale))])
+    return lax.map(lambda at: _material(at[0], start, at[1], free=free.part), (vectors, scale))
 
 
 _descent = Compiled(_descend)
@@ -118,8 +129,12 @@ class Residuals:
         """Jacobian (pixels, channels, parameters) and residuals (pixels, channels) at `u`; the pixels block by block."""
         # By a step that leads nowhere: what a step evaluates is compiled already.
         *_, kept = self._run(u, initial(u), self.free.bounds(), self.count, 1)
-        slots = tuple(f.slots for f in self.free.free)
-        jacobian, residual = zip(*(dense(part, slots) for part in np.asarray(kept)[: self.count]), strict=True)
+        columns, of = (
+            np.asarray(kept)[: self.count],
+            np.asarray(self.blocks.of) if self.free.apart else np.zeros(self.count, int),
+        )
+        parts = [dense(part, self.free.slots[k], self.free.size) for part, k in zip(columns, of, strict=False)]
+        jacobian, residual = zip(*parts, strict=True)
         return np.concatenate(jacobian), np.concatenate(residual)
 
     def _run(self, *at: Any) -> Any:

@@ -10,6 +10,7 @@ import numpy as np
 from .._compiled import Clock
 from ..capture.load import AnyView
 from ..capture.samples import Samples
+from ..capture.scene import Lit
 from ..preset import left_out, rounded
 from ..stack import Stack
 from . import words
@@ -56,8 +57,11 @@ class FitResult:
     """A fitted material and what is known of it."""
 
     stack: Stack
-    light: np.ndarray
-    """All lights over what the scene says of them, (3,): 1 but where `light.scale` is free."""
+    """The material; where references have something for themselves, that of the first."""
+    materials: list[Stack]
+    """As it is in each reference, as thick as it is there."""
+    lights: list[Lit]
+    """How bright the lights of each reference are, over what the scene says; of ambient light the radiance. Empty where they are known."""
     start: Stack
     free: Parametrisation
     vector: np.ndarray

@@ -54,24 +54,26 @@ def products(columns: Float[Array, "k c n"]) -> Float[Array, "c k k"]:
     return rows @ jnp.swapaxes(rows, 1, 2)
 
 
-def dense(columns: np.ndarray, slots: tuple[tuple[int, ...], ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Jacobian (pixels, channels, parameters) and residual (pixels, channels) in float64; `slots` as for `normal_equations`."""
+def dense(columns: np.ndarray, slots: tuple[tuple[int, ...], ...], size: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Jacobian (pixels, channels, parameters) and residual (pixels, channels) in float64; `slots` and `size` as for `normal_equations`."""
     *derivatives, residual = np.asarray(columns, float).swapaxes(1, 2)
-    jacobian = np.zeros((*residual.shape, sum(len(at) for at in slots)))
+    jacobian = np.zeros((*residual.shape, sum(len(at) for at in slots) if size is None else size))
     for derivative, at in zip(derivatives, slots, strict=True):
-        for channel in range(residual.shape[1]):
+        for channel in range(residual.shape[1]) if at else ():
             jacobian[:, channel, at[channel % len(at)]] = derivative[:, channel]
     return jacobian, residual
 
 
-def normal_equations(products: Float[Array, "c k k"], slots: tuple[tuple[int, ...], ...]) -> Normal:
-    """Half the sum of squares, its gradient and J^T J; `slots` are the places of each field's entries in the vector of parameters."""
+def normal_equations(products: Float[Array, "c k k"], slots: tuple[tuple[int, ...], ...], size: int | None = None) -> Normal:
+    """Half the sum of squares, its gradient and J^T J; `slots` are the places of each field's entries in the vector of parameters, of
+    `size` entries: none of a field that is held. Left out, there are as many as places."""
     channels = len(products)
-    size = sum(len(s) for s in slots)
+    size = sum(len(s) for s in slots) if size is None else size
     # entry[k, c, i]: channel c of field k is, or is part of, parameter i.
     entry = np.zeros((len(slots), channels, size))
     for k, at in enumerate(slots):
-        entry[k, np.arange(channels), np.array(at)] = 1.0
+        if at:
+            entry[k, np.arange(channels), np.array(at)] = 1.0
     gram = jnp.einsum("kci,ckl,lcj->ij", entry, products[:, :-1, :-1], entry)
     gradient = jnp.einsum("kci,ck->i", entry, products[:, :-1, -1])
     return 0.5 * jnp.sum(products[:, -1, -1]), (gradient, gram)

@@ -52,8 +52,10 @@ Descend = Callable[[Sequence[Minimum], str], Iterable[Minimum]]
 
 
 def space_filling(free: Parametrisation, count: int, seed: int) -> list[np.ndarray]:
-    """Starts spread evenly over the middle of the bounds (R sequence, Roberts 2018); channels of a colour move together."""
-    d = len(free.free)
+    """Starts spread evenly over the middle of the bounds (R sequence, Roberts 2018); channels of a colour move together, and so does what each
+    reference has for itself. What is of the scene starts as that says."""
+    places = {(f.layer, f.field): None for f in free.free}
+    d = len(places)
     g = 2.0
     for _ in range(64):
         g = (1.0 + g) ** (1.0 / (d + 1))
@@ -62,10 +64,11 @@ def space_filling(free: Parametrisation, count: int, seed: int) -> list[np.ndarr
     for k in range(count):
         x = (0.5 + (k + 1 + seed) * g ** -np.arange(1, d + 1)) % 1.0
         u = np.empty(free.size)
-        for place, f in zip(x, free.free, strict=True):
+        at = dict(zip(places, x, strict=True))
+        for f in free.free:
             for slot in f.slots:
                 low, high = _plausible(f.spec.scale, lower[slot], upper[slot])
-                u[slot] = low + place * (high - low)
+                u[slot] = f.to_steps(f.told) if f.of_scene else low + at[f.layer, f.field] * (high - low)
         points.append(u)
     return points
 

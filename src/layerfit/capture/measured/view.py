@@ -8,7 +8,7 @@ from ..._place import grain
 from ...errors import InputError
 from ...stack import Stack
 from ..samples import LEAST_PIXELS, Samples, layer_scales
-from ..scene import MeasuredReference
+from ..scene import Lit, MeasuredReference
 from .data import MeasuredBrdf, half_angle, sieve
 from .read import read_brdf
 
@@ -26,6 +26,7 @@ class MeasuredView:
 
     exact = True
     """There is no quadrature."""
+    directions = 1
     noise = None
     """None of the formats states its noise."""
 
@@ -52,8 +53,9 @@ class MeasuredView:
                 "measured. Start from a material that is the same everywhere"
             )
 
-    def relit(self, scale: np.ndarray) -> "MeasuredView":
+    def relit(self, lit: Lit) -> "MeasuredView":
         """The same: a measured BRDF has no lights."""
+        del lit
         return self
 
     def scales(self, stack: Stack) -> np.ndarray | None:
