@@ -276,23 +276,6 @@ def test_a_thicker_coat_is_darker():
         assert np.all(np.asarray(thick) <= np.asarray(thin))
 
 
-def test_thickness_and_absorption_are_their_product():
-    wi, wo = hemisphere(ROWS, 8), hemisphere(ROWS, 9)
-    product = Stack((Coat(tau=[0.05, 0.2, 0.6]),), Lambert()).astype(np.float64)
-    apart = Stack((Coat(absorption_per_mm=[1.0, 4.0, 12.0], thickness_um=50.0),), Lambert()).astype(np.float64)
-    np.testing.assert_allclose(brdf_rows(product, wi, wo), brdf_rows(apart, wi, wo), rtol=1e-13)
-
-
-def test_an_absent_absorption_is_a_zero_one():
-    """Left out and zero are the same to the last bits, in a form that holds less."""
-    wi, wo = hemisphere(ROWS, 10), hemisphere(ROWS, 11)
-    for base in (Conductor(alpha=0.2, **COPPER), Lambert()):
-        clear, zero = (Stack((Coat(alpha=0.2, tau=tau),), base).astype(np.float64) for tau in (None, 0.0))
-        np.testing.assert_allclose(brdf_rows(clear, wi, wo), brdf_rows(zero, wi, wo), rtol=1e-14)
-        size = [len(str(jax.make_jaxpr(brdf)(s, jnp.asarray(wi[0]), jnp.asarray(wo[0])))) for s in (clear, zero)]
-        assert size[0] < size[1]
-
-
 def test_equal_widths_are_isotropic():
     wi, wo = hemisphere(ROWS, 12), hemisphere(ROWS, 13)
     for distribution in ("ggx", "beckmann"):

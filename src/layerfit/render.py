@@ -89,7 +89,9 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, pl
     if missing := pieces * each - wi.shape[1]:
         wi = np.pad(wi, ((0, 0), (0, missing), (0, 0)), "edge")
         weight = np.pad(weight, ((0, 0), (0, missing), (0, 0)))
-    stack = jax.tree.map(lambda a: np.asarray(a, np.float32), stack)  # not `astype`: on its way to JAX it need not go there twice
+    stack = jax.tree.map(
+        lambda a: np.asarray(a, np.float32), stack
+    )  # not `astype`: on its way to JAX it need not go there twice
     place = narrowed(place, stack.reads)
     rows: list[np.ndarray] = []
     begun: deque[list[Any]] = deque()
