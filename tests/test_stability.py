@@ -10,14 +10,16 @@ import pytest
 
 from commands import layerfit
 from layerfit._fields import params
-from layerfit.layers import LAYERS
+from layerfit.forms.corrected import Corrected
+from layerfit.layers import LAYERS, Coat
 from layerfit.render import brdf
 from layerfit.report import stability as report
-from layerfit.stability import limits, measure, sweep
+from layerfit.stability import exact, limits, measure, sweep
 from layerfit.stability.grid import CLOSE, POLAR_DEG, directions, grid, parameters
 from layerfit.stability.models import structures
 from layerfit.stack import FORMS, Stack
 from layerfit.surfaces import BASES, Lambert
+from layerfit.tiers.compact import compact
 
 NARROW_BECKMANN = "conductor, distribution beckmann"
 
@@ -64,7 +66,7 @@ def test_directions_are_unit_vectors_above_the_surface():
 
 @pytest.fixture(scope="module")
 def beckmann(gl):
-    return sweep.try_structure(NARROW_BECKMANN, structures()[NARROW_BECKMANN], corners=8)
+    return sweep.try_structure(NARROW_BECKMANN, structures()[NARROW_BECKMANN], sweep.Effort(corners=8, digits=2))
 
 
 def test_narrow_gaussian_facets_hold_near_the_horizon(beckmann):
@@ -75,6 +77,7 @@ def test_narrow_gaussian_facets_hold_near_the_horizon(beckmann):
     assert beckmann["breaks"] == []
     assert beckmann["shader"]["not_finite"] == 0
     assert beckmann["shader"]["max_rel"] < 5e-5
+    assert beckmann["digits"]["float64"]["slope_beyond"] == 0
     assert beckmann["good"]
 
 
@@ -92,8 +95,7 @@ def test_what_jumps_or_turns_is_told():
     albedo = tried.values[:, 0]
 
     def of(f):
-        values = measure.Values(f[:, None], np.zeros((3, len(f), 1)), [])
-        return [told["kind"] for told in limits.breaks(tried, values)]
+        return [told["kind"] for told in limits.breaks(tried, f[:, None])]
 
     assert of(albedo / np.pi) == []
     assert of(np.where(albedo > 0.0, 1.0 + albedo, 0.0)) == ["jump"]
@@ -101,13 +103,91 @@ def test_what_jumps_or_turns_is_told():
 
 
 def test_what_is_not_finite_is_an_infinite_error():
-    whole = measure.Values(np.ones((1, 2)), np.zeros((3, 1, 2)), [])
-    broken = dataclasses.replace(whole, f=np.array([[1.0, np.nan]]))
+    broken, whole = np.array([[1.0, np.nan]]), np.ones((1, 2))
     np.testing.assert_array_equal(measure.value_error(broken, whole), [[0.0, np.inf]])
+    assert sweep.beyond(broken, whole) == 1
+    assert sweep.beyond(np.array([[1.0 + 2e-4, 5e-7]]), np.array([[1.0, 0.0]])) == 1
+
+
+def test_a_line_holds_the_index_of_another_layer_and_what_is_beside_it():
+    stack = structures()["corrected, coat over dielectric"]
+    tried = grid(stack, corners=2)
+    (k,) = (k for k, f in enumerate(tried.free) if f.name == "base.eta")
+    along, spec = tried.values[tried.lines["base.eta"], k], tried.free[k].spec
+    for side in (-1.0, 1.0):
+        for step in (0.0, *CLOSE):
+            beside = 1.5 + side * step * (spec.upper - spec.lower)
+            assert np.any(np.abs(along - beside) < 1e-15), step
+
+
+def test_parts_are_evaluated_as_one():
+    """In parts of a fixed size, of which the last is filled up."""
+    stack = structures()["lambert"]
+    tried = grid(stack, corners=2)
+    count = measure.PART + 3
+    many = dataclasses.replace(tried, values=np.linspace(0.0, 1.0, count)[:, None], lines={})
+    wi, wo, _ = directions()
+    values = measure.values_of(many.stack(stack, np.float32), wi[:2], wo[:2], np.float32)
+    assert values.f.shape == (count, 2)
+    assert values.slopes.shape == (3, count, 2)
+    np.testing.assert_allclose(values.f[:, 0], many.values[:, 0] / np.pi, rtol=1e-6)
+
+
+def test_turned_directions_stay_unit_vectors():
+    w = jnp.asarray(directions()[0])
+    way = measure.turn(w)
+    np.testing.assert_allclose(np.sum(way * w, 1), 0.0, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(way, axis=1), 1.0, rtol=1e-14)
+
+
+def test_digits_see_a_wrong_derivative_and_leave_out_a_kink():
+    """A derivative that is off by a part in a thousand is told in float64; where there is none, nothing is."""
+    pytest.importorskip("mpmath")
+    stack = structures()["conductor"]
+    tried = grid(stack, corners=2)
+    pairs = tuple(w.astype(np.float32)[5:7] for w in directions()[:2])
+    double = measure.values_of(tried.stack(stack, np.float64), *pairs, np.float64)
+    worst = np.zeros((2, len(tried.values)), int)
+    row = int(tried.lines["base.alpha"][4])
+    cases = exact.in_exact(stack, tried, pairs, [row], worst, double, 0)
+    limits_of = (1e-10, 1e-13, 1e-7)
+    held = exact.judged(cases, double, tried, limits_of, pairs)
+    assert (held["value_beyond"], held["slope_beyond"]) == (0, 0)
+    wrong = dataclasses.replace(double, slopes=1.001 * double.slopes)
+    assert exact.judged(cases, wrong, tried, limits_of, pairs)["slope_beyond"] > 0
+
+
+def test_a_base_that_is_not_seen_has_a_compact_tier():
+    """What is left of light below was a difference of roundings, and the root of it not a number."""
+    stack = structures()["corrected, coat over lambert"]
+    for row in (1, 2):  # a depth of 50; a black base
+        made = compact(grid(stack, corners=8).material(stack, row), 1e-2)
+        assert not isinstance(made, str)
+        assert made[1] < 1e-2
+
+
+def test_an_interrupted_sweep_goes_on(monkeypatch, tmp_path):
+    effort, parts = sweep.Effort(corners=2, shaders=False, digits=0, compact=0), tmp_path / "parts.json"
+    tried = []
+
+    def once(name, stack, effort):
+        tried.append(name)
+        if len(tried) == 2:
+            raise KeyboardInterrupt
+        return {"name": name, "combinations": 1, "not_finite": 0, "worst": [], "good": True}
+
+    monkeypatch.setattr(sweep, "try_structure", once)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.sweep("phong", effort=effort, parts=parts)
+    document = sweep.sweep("phong", effort=effort, parts=parts)
+    names = [name for name in structures() if "phong" in name]
+    assert [entry["name"] for entry in document["structures"]] == names
+    assert tried == [*names[:2], *names[1:]]
+    assert not parts.exists()
 
 
 def test_the_command_leaves_tables_and_maps(gl, tmp_path):
-    ran = layerfit("stability", "kubelka_munk, whole", "-o", tmp_path, "--corners", "4")
+    ran = layerfit("stability", "kubelka_munk, whole", "-o", tmp_path, "--corners", "4", "--digits", "1")
     assert ran.code == 0, ran.err
     document = json.loads((tmp_path / "stability.json").read_text())
     (entry,) = document["structures"]

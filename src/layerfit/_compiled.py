@@ -49,7 +49,7 @@ KEPT: list[Path] = []
 
 
 @cache
-def _sources() -> bytes:
+def sources() -> bytes:
     """What a trace depends on beside its arguments: this package, and the ones that trace."""
     digest = hashlib.sha256(" ".join(version(name) for name in ("jax", "jaxlib", "equinox", "lineax", "optimistix")).encode())
     package = Path(__file__).parent
@@ -127,7 +127,7 @@ class Compiled:
         shapes = [(a.shape, str(a.dtype)) for a in leaves]
         machine = jax.dtypes.canonicalize_dtype(float).name, jax.default_backend()
         what = repr((self._fn.__qualname__, _spelled(structure), shapes, static, machine))
-        path = KEPT[0] / hashlib.sha256(_sources() + what.encode()).hexdigest()
+        path = KEPT[0] / hashlib.sha256(sources() + what.encode()).hexdigest()
         exported = _kept(path)
         if exported is None:
             exported = export.export(jax.jit(of_leaves))(*leaves)

@@ -135,19 +135,25 @@ def stability(
     corners: Annotated[int, typer.Option(min=2, max=65536, help="Corners of the ranges of a structure, at most.")] = 128,
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of the corners that are drawn.")] = 0,
     shaders: Annotated[bool, typer.Option(help="Draw the printed shaders too.")] = True,
+    digits: Annotated[
+        int, typer.Option(min=0, max=1000, help="Materials of a structure that are compared with 50 digits (they need mpmath).")
+    ] = 4,
+    compact: Annotated[int, typer.Option(min=0, max=2, help="Materials of a structure whose compact tier is made.")] = 2,
 ) -> Done:
     """Try every structure at the corners of its ranges and at grazing, normal, mirror and retro directions: do the numbers hold?
 
-    Values and derivatives in float32 are compared with float64, and with the printed shader. Leaves `stability.json`, `stability.md` and a
-    heat map for each structure in the output directory. Exit code 1: something is not finite, jumps, or has lost its digits.
+    Values and derivatives in float32 are compared with float64, with 50 digits and with the printed shader. Leaves `stability.json`,
+    `stability.md` and a heat map for each structure in the output directory. Interrupted, it goes on from there when it is asked again. Exit
+    code 1: something is not finite, jumps, or has lost its digits.
 
     Example: `layerfit stability lambert -o out/stability`
     """
     from ..report.stability import table
-    from ..stability.sweep import stability_of
+    from ..stability.sweep import Effort, stability_of
 
+    effort = Effort(corners, shaders, digits, compact, seed)
     with progress() as report:
-        document = stability_of(output, word, corners=corners, shaders=shaders, seed=seed, progress=report)
+        document = stability_of(output, word, effort=effort, progress=report)
     show(table(document))
     say(f"Wrote stability.json, stability.md and heat/ in {output}/")
     words = (word,) if word else ()

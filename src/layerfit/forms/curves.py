@@ -14,7 +14,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from .._chunk import chunk, clip, member, safe_divide, safe_sqrt, struct
+from .._chunk import chunk, clip, member, safe_divide, safe_sqrt, struct, where
 from .._types import Colour, Scalar, Vec4
 from ..optics.interface import facet_tilt, rough_transmittance, second_facet
 from . import tables
@@ -125,7 +125,7 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     spread = WIDTH * there * w
     rows = (there * dT, bend, spread, 1.0 + there * (m * z - 1.0), theta)
     curves = [half for row in rows for half in jnp.split(polynomial(row), 2)]
-    rough = jnp.minimum(alpha, 1.0)
+    rough = where(alpha > 1.0, 1.0, alpha)  # not min: at 1 its derivative is half of either side's
     tilt, gain = facet_tilt(rough), second_facet(rough)
     closed = jax.vmap(lambda c: rough_transmittance(c, eta, gain))(jnp.sqrt(mu * mu + tilt * sin2))
     T = clip(closed + rows[0], 0.0, 1.0)
@@ -249,7 +249,8 @@ def _cubic(x: Any, nodes: np.ndarray, xp: Any = jnp) -> Any:
     slope[-1, -2:] = -1.0 / h[-1], 1.0 / h[-1]
     slope[-1] = 2.0 * slope[-1] - slope[-2]
     start, end, h = (xp.asarray(a, x.dtype) for a in (nodes[:-1], nodes[1:], h))
-    x = xp.minimum(xp.maximum(x, float(nodes[0])), float(nodes[-1]))
+    first, last = float(nodes[0]), float(nodes[-1])
+    x = xp.where(x > last, last, xp.where(x < first, first, x))  # not min and max: at an end they have half of the slope
     t = (x - start) / h
     u = 1.0 - t
     here = ((x >= start) & ((x < end) | (np.arange(n - 1) == n - 2))).astype(x.dtype)

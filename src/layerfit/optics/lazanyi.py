@@ -48,7 +48,8 @@ def fit_lazanyi(eta: Number, k: Number) -> Lazanyi:
     eta, k = jnp.broadcast_arrays(jnp.asarray(eta), jnp.asarray(k))
     eta, k = (x.astype(jnp.result_type(eta, k, jnp.float32)) for x in (eta, k))
     dtype = eta.dtype
-    c = jnp.asarray(np.cos(np.arange(ANGLES) * (0.5 * np.pi / ANGLES)), dtype)
+    # Rounded to float32 in every precision: beside the edge of total reflection another cosine is another reflectance.
+    c = jnp.asarray(np.cos(np.arange(ANGLES) * (0.5 * np.pi / ANGLES)).astype(np.float32), dtype)
     f0 = conductor_f0(eta, k)
     exact = jax.vmap(lambda c: fresnel_conductor(c, eta, k))(c)
     residual = jax.vmap(lambda c: fresnel_schlick(c, f0))(c) - exact

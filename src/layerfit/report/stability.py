@@ -1,6 +1,6 @@
 """What a stability sweep found: a table for the terminal and for the manual, and a heat map for each structure."""
 
-import math
+import io
 import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -8,15 +8,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from .pictures import BACKGROUND, INK, false_colour, png
+from .pictures import BACKGROUND, INK, false_colour
 
 if TYPE_CHECKING:
     from rich.console import Group
 
-MAX_REL = 1e-4
-"""float32 against float64 at the same numbers, at most: what its 24 bits leave after the worst of the divisions at grazing angles."""
+MAX_REL, MAX_ABS = 1e-4, 1e-6
+"""float32 against float64 or 50 digits at the same numbers, at most: what its 24 bits leave after the worst of the divisions at grazing
+angles; values [1/sr] within the second are as good as equal."""
+MAX_REL_DOUBLE, MAX_ABS_DOUBLE = 1e-10, 1e-13
+"""The same of float64 against 50 digits."""
+SLOPE_REL, SLOPE_REL_DOUBLE = 1e-3, 1e-7
+"""Derivatives against those of 50 digits, of float32 and float64."""
 
-_CELL, _ROWS, _LEFT, _TOP, _GAP = 22, 13, 64, 46, 30
+_CELL, _LEFT, _TOP, _GAP = 15, 64, 46, 30
+_ACROSS = 4
+"""Panels in a row."""
 _DARKEST, _BRIGHTEST = -8.0, -2.0
 """log10 of the errors at the ends of the colours: a rounding of float32, and a value that is 1 % off."""
 
@@ -26,41 +33,102 @@ def file_name(structure: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", structure.lower()).strip("_")
 
 
+def good(entry: Mapping[str, Any]) -> bool:
+    """Whether all of a structure holds: finite, without breaks, and within the tolerances, in each precision and as a shader."""
+    lost = [entry["not_finite"], entry["beyond"], len(entry["breaks"])]
+    lost += [entry["shader"]["not_finite"]] if entry["shader"] else []
+    lost += [entry["digits"][key][what] for key in ("float32", "float64") for what in _BEYOND] if entry["digits"] else []
+    return not any(lost)
+
+
+_BEYOND = "value_beyond", "slope_beyond"
+
+
 def heat_map(entry: Mapping[str, Any], polar_deg: Sequence[float]) -> bytes:
     """Largest error of a structure by angle of the light, from the normal at the left, and value of each parameter, as a PNG."""
     panels = list(entry["heat"].items())
-    width = _LEFT + len(polar_deg) * _CELL + _GAP
-    canvas = Image.new("RGB", (width * len(panels), _TOP + _ROWS * _CELL + 2 * _GAP), BACKGROUND)
+    most = max(len(rows) for _, rows in panels)
+    width, height = _LEFT + len(polar_deg) * _CELL + _GAP, _TOP + most * _CELL + _GAP
+    size = min(len(panels), _ACROSS) * width, -(-len(panels) // _ACROSS) * height
+    canvas = Image.new("RGB", (max(size[0], 2 * width), size[1]), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
-    font = ImageFont.load_default(11)
-    draw.text((8, 6), f"{entry['name']}: relative error of float32, 1e-8 (dark) to 1e-2 (bright)", fill=INK, font=font)
+    draw.text((8, 4), f"{entry['name']}: relative error of float32,", fill=INK, font=ImageFont.load_default(11))
+    draw.text((8, 16), "1e-8 (dark) to 1e-2 (bright)", fill=INK, font=ImageFont.load_default(11))
     for k, (key, rows) in enumerate(panels):
-        errors = np.array([[math.inf if error is None else error for error in row] for row in rows])
-        colours = false_colour((np.log10(np.clip(errors, 1e-9, 1.0)) - _DARKEST) / (_BRIGHTEST - _DARKEST))
-        picture = Image.fromarray((255.0 * colours).round().astype(np.uint8))
-        canvas.paste(picture.resize((_CELL * errors.shape[1], _CELL * len(rows)), 0), (k * width + _LEFT, _TOP))
-        draw.text((k * width + _LEFT, _TOP - 16), key, fill=INK, font=font)
-        for row, value in enumerate(entry["lines"][key]):
-            draw.text((k * width + _LEFT - 5, _TOP + (row + 0.5) * _CELL), f"{value:.4g}", fill=INK, font=font, anchor="rm")
-        for column in range(0, len(polar_deg), 2):
-            place = (k * width + _LEFT + (column + 0.5) * _CELL, _TOP + _ROWS * _CELL + 10)
-            draw.text(place, f"{polar_deg[column]:g}", fill=INK, font=font, anchor="mm")
-    return png(canvas)
+        place = k % _ACROSS * width + _LEFT, k // _ACROSS * height + _TOP
+        _panel(canvas, draw, place, key, np.array(rows, float), entry["lines"][key], polar_deg)
+    # As a palette: a third of the bytes, and flat squares lose nothing.
+    out = io.BytesIO()
+    canvas.quantize(64).save(out, "PNG", optimize=True)
+    return out.getvalue()
 
 
-_HEADINGS = ("structure", "combinations", "not finite", "value p99.9", "value max", "slope p99.9", "shader max", "breaks")
+def _panel(
+    canvas: Any, draw: Any, place: tuple[int, int], key: str, rows: Any, values: Any, polar_deg: Sequence[float]
+) -> None:
+    (left, top), font = place, ImageFont.load_default(9)
+    errors = np.where(np.isnan(rows), np.inf, rows)  # JSON has no word for infinity
+    colours = false_colour((np.log10(np.clip(errors, 1e-9, 1.0)) - _DARKEST) / (_BRIGHTEST - _DARKEST))
+    picture = Image.fromarray((255.0 * colours).round().astype(np.uint8))
+    canvas.paste(picture.resize((_CELL * rows.shape[1], _CELL * len(rows)), 0), place)
+    draw.text((left, top - 13), key, fill=INK, font=ImageFont.load_default(11))
+    for row, value in enumerate(values):
+        draw.text((left - 5, top + (row + 0.5) * _CELL), f"{value:.4g}", fill=INK, font=font, anchor="rm")
+    for column in range(0, len(polar_deg), 2):
+        spot = (left + (column + 0.5) * _CELL, top + len(rows) * _CELL + 8)
+        draw.text(spot, f"{polar_deg[column]:g}", fill=INK, font=font, anchor="mm")
+
+
+_HEADINGS = (
+    "structure",
+    "combinations",
+    "not finite",
+    "float32: value p99.9",
+    "max",
+    "beyond",
+    "50 digits: value",
+    "slope",
+    "beyond",
+    "float64: value",
+    "slope",
+    "beyond",
+    "shader max",
+    "compact",
+    "breaks",
+)
 
 
 def _cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
-    shader = entry["shader"]
+    shader, compact = entry["shader"], entry["compact"]
     broken = ", ".join(f"{told['kind']}: {told['parameter']}" for told in entry["breaks"]) or "-"
-    drawn = "-" if shader is None else _short(shader["max_rel"])
-    figures = (_short(entry["value_rel"]["p999"]), _short(entry["value_rel"]["max"]), _short(entry["slope_rel"]["p999"]), drawn)
-    return (entry["name"], str(entry["combinations"]), str(entry["not_finite"]), *figures, broken)
+    value = entry["value_rel"]
+    digits = [cell for key in ("float32", "float64") for cell in _digits(entry["digits"], key)]
+    return (
+        entry["name"],
+        str(entry["combinations"]),
+        str(entry["not_finite"]),
+        _short(value["p999"]),
+        _short(value["max"]),
+        str(entry["beyond"]),
+        *digits,
+        "-" if shader is None else _short(shader["max_rel"]),
+        "-" if not compact or not compact["materials"] else _short(compact["value_max"]),
+        broken,
+    )
+
+
+def _digits(digits: Mapping[str, Any] | None, key: str) -> tuple[str, str, str]:
+    if digits is None:
+        return "-", "-", "-"
+    found = digits[key]
+    return _short(found["value_max"]), _short(found["slope_max"]), f"{found['value_beyond'] + found['slope_beyond']}"
 
 
 def _short(value: float | None) -> str:
     return "infinite" if value is None else f"{value:.1e}"
+
+
+_TERMINAL = {5: "float32 off", 8: "off from 50 digits", 11: "float64 off"}
 
 
 def table(document: Mapping[str, Any]) -> "Group":
@@ -70,11 +138,13 @@ def table(document: Mapping[str, Any]) -> "Group":
     from rich.text import Text
 
     made = Table(header_style="dim", box=None, pad_edge=False)
-    for heading in _HEADINGS:
-        made.add_column(heading, justify="left" if heading in ("structure", "breaks") else "right")
+    chosen = [0, 2, 5, 8, 11, 14]
+    for k in chosen:
+        made.add_column(_TERMINAL.get(k, _HEADINGS[k]), justify="left" if k in (0, 14) else "right")
     for entry in document["structures"]:
         if not entry["good"]:
-            made.add_row(*_cells(entry))
+            cells = _cells(entry)
+            made.add_row(*(cells[k] for k in chosen))
     return Group(*([made] if made.rows else []), Text(sentence(document)))
 
 
@@ -83,7 +153,8 @@ def sentence(document: Mapping[str, Any]) -> str:
     entries = document["structures"]
     odd = [entry for entry in entries if not entry["good"]]
     tried = f"{document['combinations']} combinations of {len(entries)} structures, {document['not_finite']} numbers not finite"
-    return f"{tried}; {len(odd) or 'none'} of the structures with findings."
+    beyond = sum(entry["beyond"] for entry in entries)
+    return f"{tried}, {beyond} values of float32 beyond the tolerance; {len(odd) or 'none'} of the structures with findings."
 
 
 def markdown(document: Mapping[str, Any]) -> str:
@@ -91,14 +162,18 @@ def markdown(document: Mapping[str, Any]) -> str:
     lines = [sentence(document), "", *_row(_HEADINGS), *_row(["---"] * len(_HEADINGS))]
     for entry in document["structures"]:
         lines += _row(_cells(entry))
-    lines += ["", "The largest errors of a value, one a structure and material:", ""]
+    lines += ["", "The largest errors of a value, one a structure and material:", "", *_cases(document["worst"])]
+    return "\n".join(lines) + "\n"
+
+
+def _cases(worst: Sequence[Mapping[str, Any]]) -> list[str]:
     headings = ("structure", "parameters", "wi", "wo", "float32", "float64", "error")
-    lines += [*_row(headings), *_row(["---"] * len(headings))]
-    for case in document["worst"]:
-        numbers = ", ".join(f"{key} {value:.6g}" for key, value in case["parameters"].items())
+    lines = [*_row(headings), *_row(["---"] * len(headings))]
+    for case in worst:
+        numbers = ", ".join(f"{key} {value:.9g}" for key, value in case["parameters"].items())
         cells = [_list(case[key]) for key in ("wi", "wo", "float32", "float64")]
         lines += _row([case["structure"], numbers, *cells, _short(case["over"])])
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def _row(cells: Sequence[str]) -> list[str]:
@@ -106,4 +181,4 @@ def _row(cells: Sequence[str]) -> list[str]:
 
 
 def _list(value: Any) -> str:
-    return " ".join(f"{v:.8g}" for v in value) if isinstance(value, list) else f"{value:.8g}"
+    return " ".join(f"{v:.9g}" for v in value) if isinstance(value, list) else f"{value:.9g}"

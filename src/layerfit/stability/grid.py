@@ -20,8 +20,9 @@ NEAR_DEG = 0.3
 
 LINE = 7
 """Values evenly along the scale of a parameter, ends included, for its line through the defaults."""
-CLOSE = (1e-9, 1e-6, 1e-3)
-"""Steps from each end into the range, in parts of it: what breaks at equal indices or without absorption breaks beside it too."""
+CLOSE = (1e-12, 1e-6, 1e-3)
+"""Steps from each end into the range, in parts of it, and about an index that is that of another layer: what breaks at equal indices or
+without absorption breaks beside it too. The first is below the squared cosine of a grazing direction, by which an index is near 1 there."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,10 +34,15 @@ class Grid:
     lines: dict[str, np.ndarray]
     """Rows along each parameter, by its name, ascending."""
 
-    def stack(self, template: Stack, dtype: Any) -> Stack:
-        """All materials as one, every number an array (m,)."""
-        columns = list(self.values.T.astype(np.float32).astype(dtype))
+    def stack(self, template: Stack, dtype: Any, rounded: bool = True) -> Stack:
+        """All materials as one, every number an array (m,), rounded to float32 in every precision."""
+        values = self.values.astype(np.float32) if rounded else self.values
+        columns = list(values.T.astype(dtype))
         return jax.tree.unflatten(jax.tree.structure(template), columns)
+
+    def material(self, template: Stack, row: int) -> Stack:
+        """One of them, in float32."""
+        return jax.tree.unflatten(jax.tree.structure(template), list(self.values[row].astype(np.float32)))
 
     def inputs(self, row: int) -> dict[str, float]:
         """Parameters of one material, as they were rounded."""
@@ -58,7 +64,7 @@ def grid(stack: Stack, corners: int, seed: int = 0) -> Grid:
     rows = [_corners(free, corners, seed)]
     lines, count = {}, len(rows[0])
     for k, f in enumerate(free):
-        along = _line(f)
+        along = _line(f, [start[j] for j, g in enumerate(free) if g.field == f.field == "eta" and j != k])
         rows.append(np.repeat(start[None], len(along), 0))
         rows[-1][:, k] = along
         lines[f.name] = count + np.arange(len(along))
@@ -77,11 +83,13 @@ def _corners(free: tuple[Free, ...], most: int, seed: int) -> np.ndarray:
     return ends[np.arange(n), sides]
 
 
-def _line(f: Free) -> np.ndarray:
-    """From end to end, evenly in the coordinate of a fit, and close to the ends."""
+def _line(f: Free, meets: list[float]) -> np.ndarray:
+    """From end to end, evenly in the coordinate of a fit, and close to the ends and to the values of other layers that it meets."""
     low, high = (float(f.to_steps(end)) for end in (f.spec.lower, f.spec.upper))
     parts = np.unique([*np.linspace(0.0, 1.0, LINE), *CLOSE, *(1.0 - step for step in CLOSE)])
     inner = [float(f.from_steps(low + part * (high - low), np)) for part in parts]
+    span = f.spec.upper - f.spec.lower
+    inner += [value + side * step * span for value in meets for side in (-1.0, 1.0) for step in (0.0, *CLOSE)]
     return np.unique(np.clip(inner, f.spec.lower, f.spec.upper))
 
 

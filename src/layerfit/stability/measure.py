@@ -1,6 +1,8 @@
 """One structure on its grid: is all of it finite, and how many digits has float32?"""
 
 import dataclasses
+import math
+from collections.abc import Iterator
 from typing import Any
 
 import jax
@@ -17,6 +19,9 @@ FLOOR = OF_WHITE / np.pi
 SLOPE_FLOOR = 1e-2
 """Derivatives below this part of the value are compared with that: in the coordinate of a fit both have one unit."""
 
+PART = 64
+"""Materials that are evaluated at a time."""
+
 QUICKLY: Any = {"xla_backend_optimization_level": 0} | fusion_emitters(newer=False)
 
 
@@ -26,18 +31,38 @@ class Values:
 
     f: np.ndarray
     slopes: np.ndarray
-    """Along each of n parameters and along both directions (n + 2, m, d[, 3]), forwards."""
+    """Along each of n parameters and along a turn of both directions (n + 2, m, d[, 3]), forwards."""
     gradients: list[np.ndarray]
-    """Of the sum over pairs, backwards, for every parameter (m,) and the directions; none in float64, which is for comparison."""
+    """Of the sum over pairs and materials, backwards, for every parameter and the directions; none in float64, which is for comparison."""
 
 
 def values_of(stack: Stack, wi: np.ndarray, wo: np.ndarray, dtype: Any) -> Values:
     """Values and derivatives of every material of a stack of arrays (m,) at pairs of directions (d, 3)."""
+    forwards, backwards = (jax.jit(fn, compiler_options=QUICKLY) for fn in (_forwards, _backwards))
     with jax.enable_x64(dtype == np.float64):
-        inputs = stack, jnp.asarray(wi, dtype), jnp.asarray(wo, dtype)
-        f, slopes = jax.jit(_forwards, compiler_options=QUICKLY)(*inputs)
-        gradients = jax.jit(_backwards, compiler_options=QUICKLY)(*inputs) if dtype == np.float32 else None
-        return Values(np.asarray(f), np.asarray(slopes), [np.asarray(g) for g in jax.tree.leaves(gradients)])
+        pairs = jnp.asarray(wi, dtype), jnp.asarray(wo, dtype)
+        found = [forwards(part, *pairs) for part in _parts(stack)]
+        gradients = [jax.tree.leaves(backwards(part, *pairs)) for part in _parts(stack)] if dtype == np.float32 else []
+        count = len(jax.tree.leaves(stack)[0])
+        f = np.concatenate([f for f, _ in found])[:count]
+        slopes = np.concatenate([slopes for _, slopes in found], 1)[:, :count]
+        return Values(f, slopes, [np.concatenate(leaves) for leaves in zip(*gradients, strict=True)])
+
+
+def plain_values(stack: Stack, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """Values (m, d[, 3]) alone, in float64."""
+    values = jax.jit(_values, compiler_options=QUICKLY)
+    with jax.enable_x64(True):
+        found = [values(part, jnp.asarray(wi, float), jnp.asarray(wo, float)) for part in _parts(stack)]
+        return np.concatenate(found)[: len(jax.tree.leaves(stack)[0])]
+
+
+def _parts(stack: Stack) -> Iterator[Stack]:
+    """A few materials at a time, always as many: memory is bounded, and what is compiled for one part serves all."""
+    leaves, structure = jax.tree.flatten(stack)
+    for start in range(0, len(leaves[0]), PART):
+        part = [leaf[start : start + PART] for leaf in leaves]
+        yield jax.tree.unflatten(structure, [jnp.asarray(np.pad(x, (0, PART - len(x)), "edge")) for x in part])
 
 
 def _backwards(*inputs: Any) -> Any:
@@ -46,9 +71,18 @@ def _backwards(*inputs: Any) -> Any:
 
 def _forwards(*inputs: Any) -> Any:
     leaves, structure = jax.tree.flatten(inputs)
-    tangents = [jnp.stack([jnp.full_like(x, j == k) for k in range(len(leaves))]) for j, x in enumerate(leaves)]
+    ways = [*(jnp.ones_like(x) for x in leaves[:-2]), *map(turn, leaves[-2:])]
+    tangents = [jnp.stack([way * (j == k) for k in range(len(leaves))]) for j, way in enumerate(ways)]
     along = lambda t: jax.jvp(_values, inputs, jax.tree.unflatten(structure, t))  # noqa: E731
     return jax.vmap(along, out_axes=(None, 0))(tangents)
+
+
+def turn(w: Any) -> jax.Array:
+    """A tangent (d, 3) of unit directions (d, 3), aslant to polar angle and azimuth: along it a direction stays one."""
+    flat = jnp.stack([-w[:, 1], w[:, 0], jnp.zeros_like(w[:, 0])], -1)
+    size = jnp.linalg.norm(flat, axis=-1, keepdims=True)
+    around = jnp.where(size > 0.0, flat / jnp.where(size > 0.0, size, 1.0), jnp.array([1.0, 0.0, 0.0], w.dtype))
+    return (around + jnp.cross(around, w)) * math.sqrt(0.5)
 
 
 def _values(stack: Stack, wi: Any, wo: Any) -> Any:
@@ -59,16 +93,21 @@ def _values(stack: Stack, wi: Any, wo: Any) -> Any:
     return jax.vmap(of)(stack)
 
 
-def value_error(single: Values, double: Values) -> np.ndarray:
+def value_error(single: np.ndarray, double: np.ndarray) -> np.ndarray:
     """|float32 - float64| over the larger of the value and the floor, (m, d); infinite where either is not finite."""
-    return _worst(np.abs(single.f - double.f) / np.maximum(np.abs(double.f), FLOOR), single.f, double.f)
+    return _worst(np.abs(single - double) / np.maximum(np.abs(double), FLOOR), single, double)
 
 
-def slope_error(single: Values, double: Values, grid: Grid) -> np.ndarray:
+def fit_scale(tried: Grid) -> np.ndarray:
+    """d value / d coordinate of a fit (n, m), of every parameter of every material."""
+    columns = zip(tried.free, tried.values.T, strict=True)
+    return np.array([f.slope(f.to_steps(column)) for f, column in columns]).reshape(len(tried.free), -1)
+
+
+def slope_error(single: Values, double: Values, tried: Grid) -> np.ndarray:
     """The same of derivatives in the coordinate of a fit, (n, m, d)."""
-    n = len(grid.free)
-    columns = [f.slope(f.to_steps(column)) for f, column in zip(grid.free, grid.values.T, strict=True)]
-    scale = np.array(columns).reshape(n, -1, *[1] * (double.f.ndim - 1))
+    n = len(tried.free)
+    scale = fit_scale(tried).reshape(n, -1, *[1] * (double.f.ndim - 1))
     a, b = single.slopes[:n] * scale, double.slopes[:n] * scale
     return _worst(np.abs(a - b) / np.maximum(np.abs(b), SLOPE_FLOOR * np.abs(double.f) + FLOOR), a, b, axis=3)
 

@@ -12,6 +12,7 @@ from ..layers import LAYERS, Coat, Deposit, Erosion, Overgrowth, Patina, Polish
 from ..preset import MODELS
 from ..stack import FORMS, Stack
 from ..surfaces import BASES, Conductor, Lambert
+from ..tiers.fresnel import with_fresnel
 
 WIDTHS, THICKNESS, FILM = ("alpha_x", "alpha_y"), ("absorption_per_mm", "thickness_um"), ("film_nm", "film_eta")
 APART = (*WIDTHS, *THICKNESS, *FILM)
@@ -20,10 +21,13 @@ APART = (*WIDTHS, *THICKNESS, *FILM)
 COAT: dict[str, Any] = {"tau": 0.3}
 """A coat absorbs, unless it is left out on purpose."""
 
+SHOWN_BY_FORMULA = ("conductor", "dielectric", "lambert", "torrance_sparrow")
+"""Bases below a coat of short formulas for what facets reflect: each kind of reflectance, and none."""
+
 
 def structures() -> dict[str, Stack]:
     """Materials by a name that says what they are: every base alone and below a coat in every form, every choice of a layer, two coats,
-    and what changes in time."""
+    the tiers of short formulas, and what changes in time."""
     found: dict[str, Stack] = {}
     for name, layer in _variants(BASES):
         found[name] = Stack((), layer, Corrected())
@@ -38,7 +42,16 @@ def structures() -> dict[str, Stack]:
         found |= _coated(f"two coats over {_word(base)}", two, base)
     for name in ("coat over conductor", "coat over lambert"):
         found[f"precise multi, {name}"] = dataclasses.replace(found[f"precise, {name}"], form=Precise("multi"))
+    for name in [f"{form}, coat over {base}" for form in MODELS for base in SHOWN_BY_FORMULA]:
+        found |= dict(_short_formulas(name, found[name])) if name in found else {}
     return found | dict(_in_time())
+
+
+def _short_formulas(name: str, stack: Stack) -> Iterator[tuple[str, Stack]]:
+    """The tiers of a material that are of its own form (`compact` is tried material by material)."""
+    for kind in ("schlick", "lazanyi"):
+        if tier := with_fresnel(stack, kind):
+            yield f"{name}, tier {kind}", tier
 
 
 def _word(base: Any) -> str:

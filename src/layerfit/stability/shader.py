@@ -18,7 +18,7 @@ MATERIALS = 6
 """Corners that are printed where numbers are constants, and drawn where they are uniforms."""
 
 
-def printed(name: str, stack: Stack, tried: Grid, seed: int = 0) -> dict[str, Any]:
+def printed(stack: Stack, tried: Grid, seed: int = 0) -> dict[str, Any]:
     """Shader against JAX: the defaults, the two ends of all ranges, and corners between."""
     rows = [int(next(iter(tried.lines.values()))[0]), 0, 1, *range(2, len(tried.values))][:MATERIALS]
     shared = _with_uniforms(stack)
@@ -26,7 +26,7 @@ def printed(name: str, stack: Stack, tried: Grid, seed: int = 0) -> dict[str, An
     samples = wi[:, None], wo, np.ones_like(wi)[:, None], random_places(PAIRS, seed)
     errors, lost = [], 0
     for row in rows:
-        material = _material(stack, tried, row)
+        material = tried.material(stack, row)
         shader = print_material(material, "stability") if shared is None else _set(shared, material)
         values, model = shade_samples(shader, *samples), predict(material, *samples)
         lost += int(np.sum(~np.isfinite(values)))
@@ -39,10 +39,6 @@ def printed(name: str, stack: Stack, tried: Grid, seed: int = 0) -> dict[str, An
         "max_rel": max(e.max_rel for e in errors),
         "p999_rel": max(e.p999_rel for e in errors),
     }
-
-
-def _material(stack: Stack, tried: Grid, row: int) -> Stack:
-    return jax.tree.unflatten(jax.tree.structure(stack), list(tried.values[row].astype(np.float32)))
 
 
 def _with_uniforms(stack: Stack) -> Shader | None:

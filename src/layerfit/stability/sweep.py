@@ -1,91 +1,165 @@
 """`layerfit stability`: every structure on its grid, in float32, in float64 and as its printed shader."""
 
+import dataclasses
+import functools
 import json
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
+from .._compiled import sources
 from ..documents import check_directory, finite, write_bytes, write_text
 from ..errors import InputError
+from ..forms.precise import Precise
 from ..report import stability as report
 from ..report.told import Told
 from ..stack import Stack
+from ..study.kept import Kept
 from . import limits, shader
-from .grid import POLAR_DEG, Grid, directions, grid
-from .measure import Values, slope_error, value_error, values_of
+from .digits import numbers
+from .exact import in_exact, judged
+from .grid import CLOSE, POLAR_DEG, Grid, directions, grid
+from .measure import Values, plain_values, slope_error, value_error, values_of
 from .models import structures
+from .tier import try_compact
 
-CORNERS = 128
-"""Corners of the ranges of one structure, of as many as there are."""
 WORST = 10
+PARTS = "stability.parts.json"
+"""What is done of a sweep, until all of it is."""
 
 Progress = Callable[[str, float], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Effort:
+    """How much is tried of one structure."""
+
+    corners: int = 128
+    """Of the ranges, of as many as there are."""
+    shaders: bool = True
+    digits: int = 4
+    """Materials that are compared with 50 digits; none at 0."""
+    compact: int = 2
+    """Materials whose compact tier is made."""
+    seed: int = 0
 
 
 def sweep(
     word: str = "",
     *,
-    corners: int = CORNERS,
-    shaders: bool = True,
-    seed: int = 0,
+    effort: Effort = Effort(),
+    parts: Path | None = None,
     progress: Progress = lambda stage, share: None,
 ) -> dict[str, Any]:
     """The content of `stability.json`, for all structures whose names hold `word`. The same numbers for the same seed.
 
-    Raises `InputError` where no structure has such a name, and `MachineError` where shaders are asked for and there is no OpenGL.
+    What is done is kept in the file `parts`, and an interrupted sweep goes on from there, if source and effort are the same. Raises
+    `InputError` where no structure has such a name, and `MachineError` where shaders are asked for and there is no OpenGL, or digits and
+    no mpmath.
     """
     chosen = {name: stack for name, stack in structures().items() if word in name}
     if not chosen:
         raise InputError(
             f"no structure has {word!r} in its name; without a name all are tried, from {next(iter(structures()))!r} on"
         )
+    if effort.digits:
+        numbers()
+    kept = Kept(parts, [word, dataclasses.asdict(effort), sources().hex()]) if parts else None
     found = []
     for k, (name, stack) in enumerate(chosen.items()):
         progress(name, k / len(chosen))
-        found.append(try_structure(name, stack, corners=corners, shaders=shaders, seed=seed))
-    worst = sorted((case for entry in found for case in entry["worst"]), key=lambda case: -case["over"])[:WORST]
-    return finite(
-        {
-            "schema": "layerfit/stability",
-            "version": 1,
-            "seed": seed,
-            "polar_deg": list(POLAR_DEG),
-            "combinations": sum(entry["combinations"] for entry in found),
-            "not_finite": sum(entry["not_finite"] for entry in found),
-            "structures": found,
-            "worst": worst,
-            "good": all(entry["good"] for entry in found),
-        }
-    )
+        make = functools.partial(try_structure, name, stack, effort)
+        found.append(kept.part(name, make) if kept else make())
+        jax.clear_caches()  # of each structure some 100 MB
+    if kept:
+        kept.done()
+    return finite(_document(found, effort))
 
 
-def try_structure(name: str, stack: Stack, *, corners: int = CORNERS, shaders: bool = True, seed: int = 0) -> dict[str, Any]:
+def _document(found: list[dict[str, Any]], effort: Effort) -> dict[str, Any]:
+    worst = sorted((case for entry in found for case in entry["worst"]), key=lambda case: -(case["over"] or math.inf))[:WORST]
+    return {
+        "schema": "layerfit/stability",
+        "version": 2,
+        **dataclasses.asdict(effort),
+        "polar_deg": list(POLAR_DEG),
+        "combinations": sum(entry["combinations"] for entry in found),
+        "not_finite": sum(entry["not_finite"] for entry in found),
+        "structures": found,
+        "worst": worst,
+        "good": all(entry["good"] for entry in found),
+    }
+
+
+def try_structure(name: str, stack: Stack, effort: Effort = Effort()) -> dict[str, Any]:
     """One structure: how many digits float32 has of values and derivatives, what is not finite, and what physics says and does not hold."""
-    tried = grid(stack, corners, seed)
+    tried = grid(stack, effort.corners, effort.seed)
     wi, wo, polar = (a.astype(np.float32) for a in directions())
     single, double = (values_of(tried.stack(stack, dtype), wi, wo, dtype) for dtype in (np.float32, np.float64))
-    value, slope = value_error(single, double), slope_error(single, double, tried)
-    parts = (single.f, single.slopes, double.f, double.slopes, *single.gradients)
-    breaks = limits.breaks(tried, double)
-    printed = shader.printed(name, stack, tried, seed) if shaders else None
+    value, slope = value_error(single.f, double.f), slope_error(single, double, tried)
+    breaks = limits.breaks(tried, plain_values(tried.stack(stack, np.float64, rounded=False), wi, wo))
+    default = int(next(iter(tried.lines.values()))[len(CLOSE)])
+    made = try_compact(stack, tried, [default, 0][: effort.compact], (wi, wo), effort.shaders) if effort.compact else None
+    lost = sum(np.sum(~np.isfinite(part)) for part in (single.f, single.slopes, double.f, double.slopes, *single.gradients))
     entry = {
         "name": name,
         "parameters": [f.name for f in tried.free],
         "materials": len(tried.values),
-        "combinations": int(value.size),
-        "not_finite": int(sum(np.sum(~np.isfinite(part)) for part in parts)),
+        "combinations": int(value.size) + (made["combinations"] if made else 0),
+        "not_finite": int(lost) + (made["not_finite"] if made else 0),
+        "beyond": beyond(single.f, double.f),
         "value_rel": _quantiles(value),
         "slope_rel": _quantiles(slope),
         "breaks": breaks,
-        "shader": printed,
+        "shader": shader.printed(stack, tried, effort.seed) if effort.shaders else None,
+        "compact": made,
+        "digits": _digits(stack, tried, (single, double), (value, slope.max(0)), default, effort) if effort.digits else None,
         "heat": {key: _heat(value[rows], polar) for key, rows in tried.lines.items()},
         "lines": {f.name: tried.values[tried.lines[f.name], k].tolist() for k, f in enumerate(tried.free)},
         "worst": [*_worst(name, tried, value, single, double, (wi, wo))],
     }
-    held = entry["not_finite"] == 0 and not breaks and (printed is None or printed["not_finite"] == 0)
-    return entry | {"good": bool(held and entry["value_rel"]["max"] <= report.MAX_REL)}
+    return entry | {"good": report.good(entry)}
+
+
+def beyond(single: np.ndarray, double: np.ndarray) -> int:
+    """Combinations (m, d) of which float32 is off by more than the tolerance, relative and absolute."""
+    off = np.abs(single - double)
+    far = ~((off <= report.MAX_REL * np.abs(double)) | (off <= report.MAX_ABS))
+    return int(np.sum(far if far.ndim == 2 else far.any(-1)))
+
+
+def _digits(
+    stack: Stack,
+    tried: Grid,
+    values: tuple[Values, Values],
+    errors: tuple[np.ndarray, np.ndarray],
+    default: int,
+    effort: Effort,
+) -> dict[str, Any]:
+    """The materials with the largest errors of a value and of a slope, the defaults, and others: in 50 digits."""
+    pairs = [w.astype(np.float32) for w in directions()[:2]]
+    drawn = np.random.default_rng((effort.seed, 2)).integers(0, len(tried.values), effort.digits).tolist()
+    rows = list(dict.fromkeys([*(int(np.argmax(error.max(1))) for error in errors), default, *drawn]))
+    rows = rows[: 1 if isinstance(stack.form, Precise) else effort.digits]  # a precise one takes a minute
+    worst = np.stack([np.argmax(error, 1) for error in errors])
+    cases = in_exact(stack, tried, (pairs[0], pairs[1]), rows, worst, values[1], effort.seed)
+    limits_of = (
+        (report.MAX_REL, report.MAX_ABS, report.SLOPE_REL),
+        (report.MAX_REL_DOUBLE, report.MAX_ABS_DOUBLE, report.SLOPE_REL_DOUBLE),
+    )
+    single, double = (judged(cases, v, tried, limit, pairs) for v, limit in zip(values, limits_of, strict=True))
+    slopes = sum(case.slopes.size for case in cases)
+    return {
+        "cases": len(cases),
+        "slopes": slopes,
+        "without_slope": int(sum(np.isnan(case.slopes).sum() for case in cases)),
+        "float32": single,
+        "float64": double,
+    }
 
 
 def _quantiles(error: np.ndarray) -> dict[str, float]:
@@ -135,6 +209,6 @@ def write_stability(document: Mapping[str, Any], directory: Path) -> None:
 def stability_of(directory: Path, word: str = "", **options: Any) -> Told:
     """Sweep, and write the results; a directory that cannot be written to is told before the work."""
     check_directory(directory)
-    document = sweep(word, **options)
+    document = sweep(word, parts=directory / PARTS, **options)
     write_stability(document, directory)
     return Told(document, report.table(document))

@@ -74,7 +74,10 @@ def largest_error(other: Stack, stack: Stack) -> float:
 
 
 def _compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
-    recipe = _recipe(stack)
+    with np.errstate(divide="ignore", invalid="ignore"):  # over what may be 0: told below
+        recipe = _recipe(stack)
+    if lost := [name for name, curve in recipe.curves.items() if not curve.possible]:
+        return f"what polynomials would follow ({', '.join(lost)}) has no values to fit, as of a base that is not seen"
     fitted, others = (_Judge(stack, seed) for seed in (1, 2))
     full = {name: curve.most for name, curve in recipe.curves.items()}
     best = fitted.error(_padded(recipe, full))

@@ -79,7 +79,8 @@ def recipe(prepared: Any, name: str, evaluate: Any) -> Recipe:
         w = jnp.stack([jnp.sqrt((1.0 - NoW) * (1.0 + NoW)), 0.0 * NoW, NoW])
         # Light from below alone does not ask for the azimuth: here it is at a right angle.
         aside = w[jnp.array([1, 0, 2])]
-        below = evaluate(prepared, w, aside) - coat.evaluate(w, aside)
+        # Of a base that is not seen a difference of roundings is left, of either sign.
+        below = jnp.maximum(evaluate(prepared, w, aside) - coat.evaluate(w, aside), 0.0)
         closed = rough_transmittance(jnp.sqrt(interface.tilt + (1.0 - interface.tilt) * NoW * NoW), coat.eta, interface.gain)
         if not precise:
             T = cross(interface, coat, w, w).T

@@ -57,6 +57,11 @@ class Curve:
     most: int = MOST
     """Highest degree that is tried."""
 
+    @property
+    def possible(self) -> bool:
+        """Whether there is something to run through: more than one argument, and numbers that are finite."""
+        return bool(np.ptp(self.x) > 0.0) and all(bool(np.all(np.isfinite(a))) for a in (self.x, self.y, self.weight))
+
     def fit(self, degree: int, length: int = 0) -> Polynomial:
         """Least squares over Chebyshev's polynomials; `length` pads with coefficients of 0, for polynomials of one shape."""
         chebyshev = np.polynomial.chebyshev
