@@ -15,6 +15,7 @@
 - Structures: choose_structure tries candidates and gives a StructureChoice; structures_of does what `layerfit structures` does.
 - Rendering: predict gives pixels, radiance the same traced, brdf the plain function; Place is where on the surface.
 - Shaders: print_material gives a Shader; shade_samples draws it; check_pairs and check_image compare it with JAX and give a Parity.
+- Other programs: export_to writes their material, an Export with what is lost; read_start gives the layers of one of theirs.
 - Error against run time: tradeoff does what `layerfit tradeoff` does, specialise leaves out what a scene does not need.
 - Notebooks: live shows a material with sliders, both ways. plot_plane, plot_convergence and plot_tradeoff draw into axes of matplotlib.
 - Tiers: make_tier gives another way to print a material, a Tier; choose_tier the cheapest that is near enough, a Choice.

@@ -18,6 +18,7 @@ from .fit.structures import StructureChoice as StructureChoice, choose_structure
 from .forms.corrected import Corrected as Corrected
 from .forms.faithful import Faithful as Faithful
 from .forms.precise import Precise as Precise
+from .interchange.formats import Export as Export, export_to as export_to, read_start as read_start
 from .job import fit_scene as fit_scene
 from .layers import (
     Coat as Coat,
