@@ -49,18 +49,18 @@ const Coat lf_sealer = Coat(
 );
 
 const Interface lf_sealer_interface = Interface(
-    0.016290858,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.016290857,                                                 // tilt: turn of the mean facet towards a grazing direction
     0.018790323,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.015395064, 0.029927302, -0.025977567, 0.016997553),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(0.02026537, -0.0470525, 0.004219939, 0.016061414),      // passed_high: the other four, of higher powers
+    vec4(-0.015395064, 0.029927302, -0.025977567, 0.016997509),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(0.02026537, -0.04705244, 0.004219939, 0.016061384),     // passed_high: the other four, of higher powers
     vec4(1.0145565, -0.030538797, 0.030454278, -0.026311874),    // bend: sine of the refracted light over that at a smooth interface
     vec4(0.054229736, -0.0448761, -0.026406765, 0.031392574),    // bend_high: 
     vec4(0.6039827, -0.3000627, 0.08446753, -0.19967735),        // spread: width of a lobe seen through it
-    vec4(0.5159378, -0.32803822, -0.29164636, 0.27426577),       // spread_high: 
-    vec4(1.0248023, -0.06177166, 0.07569051, -0.09051132),       // path: mean path over that of the refracted direction
-    vec4(0.11299968, -0.036239624, -0.07774711, 0.05434084),     // path_high: 
-    vec4(0.048516277, -0.13666643, 0.20207725, -0.104451716),    // theta: scale of the path's distribution
-    vec4(0.14904942, -0.3628089, -0.07314008, 0.30970302)        // theta_high: 
+    vec4(0.51593876, -0.32803917, -0.29164684, 0.274266),        // spread_high: 
+    vec4(1.0248024, -0.061772138, 0.07569051, -0.090509415),     // path: mean path over that of the refracted direction
+    vec4(0.113001585, -0.03624344, -0.07774806, 0.054341316),    // path_high: 
+    vec4(0.048516277, -0.13666643, 0.20207731, -0.10445173),     // theta: scale of the path's distribution
+    vec4(0.14904943, -0.36280888, -0.07314009, 0.309703)         // theta_high: 
 );
 
 const OrenNayar lf_concrete = OrenNayar(
@@ -68,7 +68,7 @@ const OrenNayar lf_concrete = OrenNayar(
     0.5                     // sigma: standard deviation of the facet angle [rad]
 );
 
-const vec3 lf_concrete_returned = vec3(0.4889417, 0.44730937, 0.37751332);
+const vec3 lf_concrete_returned = vec3(0.4889417, 0.44730935, 0.37751332);
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
@@ -224,7 +224,7 @@ vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
     direct = direct + aside * c3 * (product * product) * tan_mean;
     float interreflected = c4 * (1.0 - cos_phi * (smaller * smaller));
-    return albedo / 3.1415927 * (direct + albedo * interreflected);
+    return albedo / 3.1415927 * max(direct + albedo * interreflected, 0.0);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.

@@ -58,7 +58,7 @@ vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
     direct = direct + aside * c3 * (product * product) * tan_mean;
     float interreflected = c4 * (1.0 - cos_phi * (smaller * smaller));
-    return albedo / 3.1415927 * (direct + albedo * interreflected);
+    return albedo / 3.1415927 * max(direct + albedo * interreflected, 0.0);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.

@@ -49,18 +49,18 @@ const Coat lf_shellac = Coat(
 );
 
 const Interface lf_shellac_interface = Interface(
-    0.0031546697,                                                    // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                    // gain: part of the reflected light that a second facet lets in
-    vec4(-0.0034473585, 0.0104929395, -0.0077287657, 0.0044819512),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.04213125, 0.045227446, 0.026484776, -0.033615567),       // passed_high: the other four, of higher powers
-    vec4(1.0012681, -0.0026631951, 0.0062201023, -0.007827282),      // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.0073037148, 0.009596825, 0.01598382, -0.015121937),      // bend_high: 
-    vec4(0.62042105, -0.24971355, 0.10796562, -0.16095579),          // spread: width of a lobe seen through it
-    vec4(-0.44668567, 0.4370501, 0.7647935, -0.6965449),             // spread_high: 
-    vec4(1.0028697, -0.008274645, 0.013678789, -0.010128498),        // path: mean path over that of the refracted direction
-    vec4(0.00033640862, -0.018997192, 0.043246984, -0.022567272),    // path_high: 
-    vec4(0.0045232605, -0.025034636, 0.057004213, 0.07805832),       // theta: scale of the path's distribution
-    vec4(-0.099412754, -0.29612407, 0.18628636, 0.11796054)          // theta_high: 
+    0.0031546694,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.0034473583, 0.010492936, -0.0077287657, 0.004481966),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.04213125, 0.04522743, 0.026484784, -0.03361556),       // passed_high: the other four, of higher powers
+    vec4(1.0012681, -0.0026634336, 0.0062196255, -0.007826328),    // bend: sine of the refracted light over that at a smooth interface
+    vec4(-0.0073018074, 0.009594917, 0.015981913, -0.015120983),   // bend_high: 
+    vec4(0.62042105, -0.2497138, 0.10796586, -0.16095579),         // spread: width of a lobe seen through it
+    vec4(-0.44668567, 0.4370501, 0.7647935, -0.6965437),           // spread_high: 
+    vec4(1.0028697, -0.008274883, 0.013679743, -0.010127544),      // path: mean path over that of the refracted direction
+    vec4(0.00033450127, -0.019001007, 0.04324889, -0.022566319),   // path_high: 
+    vec4(0.00452326, -0.025034625, 0.057004232, 0.078058206),      // theta: scale of the path's distribution
+    vec4(-0.099412814, -0.2961239, 0.18628639, 0.11796043)         // theta_high: 
 );
 
 const OrenNayar lf_mahogany = OrenNayar(
@@ -68,7 +68,7 @@ const OrenNayar lf_mahogany = OrenNayar(
     0.2                       // sigma: standard deviation of the facet angle [rad]
 );
 
-const vec3 lf_mahogany_returned = vec3(0.46170342, 0.30869326, 0.13005143);
+const vec3 lf_mahogany_returned = vec3(0.4617034, 0.30869326, 0.13005143);
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
@@ -224,7 +224,7 @@ vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
     direct = direct + aside * c3 * (product * product) * tan_mean;
     float interreflected = c4 * (1.0 - cos_phi * (smaller * smaller));
-    return albedo / 3.1415927 * (direct + albedo * interreflected);
+    return albedo / 3.1415927 * max(direct + albedo * interreflected, 0.0);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.

@@ -46,27 +46,27 @@ struct Crossing {
 };
 
 const Coat lf_water = Coat(
-    vec3(-0.059171744, -0.008056991, 0.0060191955),        // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
-    vec3(0.17040384, 0.10476845, 0.056797523),             // film_1: degree 1
-    vec3(-0.046546992, -0.055890545, -0.054670602),        // film_2: degree 2
-    vec3(-0.010014229, -0.010763829, 3.360957e-05),        // film_3: degree 3
-    vec3(0.011933446, 0.010097773, 0.014425426),           // film_4: degree 4
-    vec3(-0.000563303, -0.00043339748, 0.00071096234),     // film_5: degree 5
-    vec3(-0.0012860983, -0.0007768632, -0.00046707876),    // film_6: degree 6
-    vec3(-0.00030815415, -6.429292e-05, -0.00012617838),   // film_7: degree 7
-    vec3(-0.00010847207, -6.9350936e-06, -0.00011929264),  // film_8: degree 8
-    vec3(5.0602015e-05, 6.4195134e-05, -2.9057264e-07),    // film_9: degree 9
-    0.08,                                                  // alpha: width of the facet slopes; the square of an artist's roughness
-    1.33                                                   // eta: index of refraction, against air
+    vec3(-0.05917175, -0.0080569815, 0.006019214),        // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
+    vec3(0.17040384, 0.104768425, 0.05679749),            // film_1: degree 1
+    vec3(-0.046546992, -0.05589053, -0.054670587),        // film_2: degree 2
+    vec3(-0.010014229, -0.010763836, 3.3600256e-05),      // film_3: degree 3
+    vec3(0.011933453, 0.010097774, 0.01442542),           // film_4: degree 4
+    vec3(-0.0005633179, -0.00043339375, 0.00071098283),   // film_5: degree 5
+    vec3(-0.0012860834, -0.0007768688, -0.00046710297),   // film_6: degree 6
+    vec3(-0.00030816533, -6.42864e-05, -0.00012616254),   // film_7: degree 7
+    vec3(-0.00010846462, -6.938353e-06, -0.00011930987),  // film_8: degree 8
+    vec3(5.059829e-05, 6.419467e-05, -2.779998e-07),      // film_9: degree 9
+    0.08,                                                 // alpha: width of the facet slopes; the square of an artist's roughness
+    1.33                                                  // eta: index of refraction, against air
 );
 
 const Interface lf_water_interface = Interface(
     1.33,         // n: index of the medium below, against air
     0.08,         // alpha: width of the facets, mean of the axes
-    0.019120086,  // tilt: turn of the mean facet towards a grazing direction
+    0.019120084,  // tilt: turn of the mean facet towards a grazing direction
     0.02422721,   // gain: part of the reflected light that a second facet lets in
     0.001215193,  // lengthening: path added by the spread of refracted directions, in thicknesses
-    0.39689553    // drift: scale of the path added at grazing angles
+    0.3968955     // drift: scale of the path added at grazing angles
 );
 
 const OrenNayar lf_asphalt = OrenNayar(
@@ -219,7 +219,7 @@ float lf_oren_nayar_full(vec3 wi, vec3 wo, float albedo, float sigma) {
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
     direct = direct + aside * c3 * (product * product) * tan_mean;
     float interreflected = c4 * (1.0 - cos_phi * (smaller * smaller));
-    return albedo / 3.1415927 * (direct + albedo * interreflected);
+    return albedo / 3.1415927 * max(direct + albedo * interreflected, 0.0);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.

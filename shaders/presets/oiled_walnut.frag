@@ -51,14 +51,14 @@ const Coat lf_oil = Coat(
 const Interface lf_oil_interface = Interface(
     0.07902597,                                                    // tilt: turn of the mean facet towards a grazing direction
     0.21274194,                                                    // gain: part of the reflected light that a second facet lets in
-    vec4(-0.07798231, 0.058746383, 0.0075020567, 0.041144773),     // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.047764815, -0.019873917, 0.023969818, -0.0016630441),  // passed_high: the other four, of higher powers
-    vec4(1.1669741, -0.1808559, 0.039536238, 0.06320453),          // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.034553528, -0.018118858, 0.011247635, 0.002400875),    // bend_high: 
-    vec4(0.47853708, -0.08060069, -0.09847978, 0.04845512),        // spread: width of a lobe seen through it
-    vec4(0.035307884, -0.040828705, -0.0068770647, 0.012409687),   // spread_high: 
-    vec4(1.1355146, -0.22439283, 0.1115489, 0.04601288),           // path: mean path over that of the refracted direction
-    vec4(-0.09534311, 0.036826134, 0.02803421, -0.02294445),       // path_high: 
+    vec4(-0.07798231, 0.058746383, 0.0075020567, 0.041144893),     // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.047764577, -0.019874156, 0.023969818, -0.0016629249),  // passed_high: the other four, of higher powers
+    vec4(1.1669741, -0.1808559, 0.039536238, 0.06320357),          // bend: sine of the refracted light over that at a smooth interface
+    vec4(-0.034553528, -0.018116951, 0.011247635, 0.002400875),    // bend_high: 
+    vec4(0.47853708, -0.080600925, -0.09847978, 0.04845512),       // spread: width of a lobe seen through it
+    vec4(0.035307884, -0.040828705, -0.006877303, 0.01240921),     // spread_high: 
+    vec4(1.1355146, -0.22439307, 0.11154938, 0.046013832),         // path: mean path over that of the refracted direction
+    vec4(-0.09534407, 0.036819458, 0.02803421, -0.02294445),       // path_high: 
     vec4(0.31047225, -0.5736654, 0.39680478, 0.07639581),          // theta: scale of the path's distribution
     vec4(-0.3474359, 0.121623755, 0.12213464, -0.048579425)        // theta_high: 
 );
@@ -224,7 +224,7 @@ vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
     direct = direct + aside * c3 * (product * product) * tan_mean;
     float interreflected = c4 * (1.0 - cos_phi * (smaller * smaller));
-    return albedo / 3.1415927 * (direct + albedo * interreflected);
+    return albedo / 3.1415927 * max(direct + albedo * interreflected, 0.0);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.

@@ -49,7 +49,7 @@ const Coat lf_varnish = Coat(
 );
 
 const Interface lf_varnish_interface = Interface(
-    0.019120086,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.019120084,                                                 // tilt: turn of the mean facet towards a grazing direction
     0.02422721,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.017708257, 0.031569272, -0.022334382, 0.008231912),  // passed: energy that passes, beyond the closed form: four coefficients
     vec4(0.028344193, -0.04514841, -0.003954705, 0.019649286),   // passed_high: the other four, of higher powers
@@ -224,7 +224,7 @@ vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
     direct = direct + aside * c3 * (product * product) * tan_mean;
     float interreflected = c4 * (1.0 - cos_phi * (smaller * smaller));
-    return albedo / 3.1415927 * (direct + albedo * interreflected);
+    return albedo / 3.1415927 * max(direct + albedo * interreflected, 0.0);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.

@@ -89,12 +89,12 @@ const Coat lf_patina_coat = Coat(
 );
 
 const Interface lf_patina_interface = Interface(
-    2.7,          // n: index of the medium below, against air
-    0.5,          // alpha: width of the facets, mean of the axes
-    0.113175176,  // tilt: turn of the mean facet towards a grazing direction
-    0.30666155,   // gain: part of the reflected light that a second facet lets in
-    0.09754825,   // lengthening: path added by the spread of refracted directions, in thicknesses
-    11.62644      // drift: scale of the path added at grazing angles
+    2.7,         // n: index of the medium below, against air
+    0.5,         // alpha: width of the facets, mean of the axes
+    0.11317518,  // tilt: turn of the mean facet towards a grazing direction
+    0.30666155,  // gain: part of the reflected light that a second facet lets in
+    0.09754825,  // lengthening: path added by the spread of refracted directions, in thicknesses
+    11.62644     // drift: scale of the path added at grazing angles
 );
 
 const Conductor lf_base = Conductor(
@@ -486,7 +486,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float sky) {
         float t7 = t5 * u3;
         float cosine = sqrt(max(t7 * t7 + (lf_patina_interface.n - t5) * (lf_patina_interface.n + t5), 0.0)) / lf_patina_interface.n;
         float outside = u3 * sqrt(max(1.0 - t6 * t6, 0.0));
-        t5 = 1.0 - T;
+        t7 = 1.0 - T;
         float path = 1.0 / max(cosine, 1e-06);
         Fluence beam = lf_fluence(t3, path);
         vec3 third = t3 * path / 3.0;
@@ -498,14 +498,14 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float sky) {
         vec3 next_one = t8 * t8;
         vec3 after_next = next_one * exp(-third);
         t8 = lf_fresnel_conductor(cosine, lf_base.eta, lf_base.k);
-        series = 1.0 / max(1.0 - t5 * t8 * beam.base * beam.base, 1e-06);
-        vec3 across = t5 * t8 * beam.base;
-        vec3 one_sided = t5 * beam.upper * beam.upper + t8 * beam.lower * beam.lower;
-        vec3 one_sided2 = t5 * beam.upper * beam.middle + t8 * beam.lower * beam.middle;
-        vec3 one_sided3 = t5 * beam.upper * beam.lower + t8 * beam.lower * beam.upper;
-        vec3 one_sided4 = t5 * beam.middle * beam.middle + t8 * beam.middle * beam.middle;
-        vec3 one_sided5 = t5 * beam.middle * beam.lower + t8 * beam.middle * beam.upper;
-        vec3 one_sided6 = t5 * beam.lower * beam.lower + t8 * beam.upper * beam.upper;
+        series = 1.0 / max(1.0 - t7 * t8 * beam.base * beam.base, 1e-06);
+        vec3 across = t7 * t8 * beam.base;
+        vec3 one_sided = t7 * beam.upper * beam.upper + t8 * beam.lower * beam.lower;
+        vec3 one_sided2 = t7 * beam.upper * beam.middle + t8 * beam.lower * beam.middle;
+        vec3 one_sided3 = t7 * beam.upper * beam.lower + t8 * beam.lower * beam.upper;
+        vec3 one_sided4 = t7 * beam.middle * beam.middle + t8 * beam.middle * beam.middle;
+        vec3 one_sided5 = t7 * beam.middle * beam.lower + t8 * beam.middle * beam.upper;
+        vec3 one_sided6 = t7 * beam.lower * beam.lower + t8 * beam.upper * beam.upper;
         path = 1.0 / max(outside, 1e-06);
         Fluence beam2 = lf_fluence(t3, path);
         third = t3 * path / 3.0;

@@ -98,7 +98,8 @@ def oren_nayar_full(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour
     direct = c1 + c2 * where(dot_xy >= 0.0, forward, backward)
     direct = direct + aside * c3 * (product * product) * tan_mean
     interreflected = c4 * (1.0 - cos_phi * (smaller * smaller))
-    return albedo / jnp.pi * (direct + albedo * interreflected)
+    # Far from the light, grooves steeper than their fit was made for would reflect less than nothing.
+    return albedo / jnp.pi * jnp.maximum(direct + albedo * interreflected, 0.0)
 
 
 @layer
