@@ -317,6 +317,10 @@ BAD = {
         "baseColorTexture .* Use factors alone",
     ),
     "words.gltf": ('{"materials": [{"pbrMetallicRoughness": {"metallicFactor": "x"}}]}', "metallicFactor = 'x'"),
+    "bright.gltf": (
+        '{"materials": [{"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor": [2, 1, 1, 1]}}]}',
+        "base.albedo = .* outside its range 0 to 1",
+    ),
     "a.glb": ("glTF", "not a binary glTF"),
     "a.mtlx": ("<materialx>", "not valid XML"),
     "entities.mtlx": ('<!DOCTYPE a [<!ENTITY b "c">]><materialx/>', "declares entities"),

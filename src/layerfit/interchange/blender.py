@@ -123,7 +123,7 @@ def engine_of(values: dict[str, Any]) -> Engine:
     coated = values["Coat Weight"] > 0.0
     kind = words.base_of(values["Metallic"], values["Specular IOR Level"] > 0.0 and not coated)
     found: dict[str, Any] = {"base": kind, "base_color": np.asarray(values["Base Color"], float)}
-    alpha = max(values["Roughness"] ** 2, 1e-3)
+    alpha = words.width(values["Roughness"])
     if kind == "mixed":
         found["metallic"] = values["Metallic"]
     if kind in ("metal", "mixed"):
@@ -138,7 +138,7 @@ def engine_of(values: dict[str, Any]) -> Engine:
     elif kind != "diffuse":
         found["alpha"] = alpha
     if coated:
-        found |= {"coat_alpha": max(values["Coat Roughness"] ** 2, 1e-3), "coat_ior": values["Coat IOR"]}
+        found |= {"coat_alpha": words.width(values["Coat Roughness"]), "coat_ior": values["Coat IOR"]}
         if min(values["Coat Tint"]) < 1.0:
             found["coat_tau"] = words.depth(values["Coat Tint"], 2.0)
     return Engine(dialect="blender", **found)

@@ -6,14 +6,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from .. import preset as presets
 from .._data import shaders
 from ..documents import MAX_BYTES, nearest, read_document, write_text
 from ..errors import InputError
-from ..preset import SCHEMA as PRESET, read_preset
+from ..preset import SCHEMA as PRESET, preset_of, read_preset
 from ..shipped import find_preset
 from ..stack import Stack
 from . import blender, gltf, materialx, openpbr, web
 from .convert import Conversion, convert, mean_error
+from .engine import Engine
 from .mapping import stack_of
 from .stage import samples, scene_views
 
@@ -114,11 +116,19 @@ def read_start(path: Path) -> Stack:
         )
     if ending == ".json":
         document = read_document(path)
-        return read_preset(path) if document.get("schema") == PRESET else stack_of(blender.read(path, document))
+        return read_preset(path) if document.get("schema") == PRESET else _checked(blender.read(path, document), path)
     content = _bytes(path)
     if ending == ".mtlx":
-        return stack_of(openpbr.read(path, content.decode("utf-8", errors="replace")))
-    return stack_of(gltf.read(path, content))
+        return _checked(openpbr.read(path, content.decode("utf-8", errors="replace")), path)
+    return _checked(gltf.read(path, content), path)
+
+
+def _checked(engine: Engine, path: Path) -> Stack:
+    """The layers of somebody's material, read once more as a preset: a value out of its range is told by name."""
+    document = preset_of(stack_of(engine), "start")
+    return presets.stack_of(
+        {key: document[key] for key in ("model", "interface", "layers", "base") if key in document}, str(path)
+    )
 
 
 def _advice(ending: str) -> str:

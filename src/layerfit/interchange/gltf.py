@@ -121,18 +121,21 @@ def engine_of(made: Any, where: str) -> Engine:
     coated = number(coat, "clearcoatFactor", 0.0) > 0.0
     kind = words.base_of(metallic, number(specular, "specularFactor", 1.0) > 0.0 and not coated)
     found: dict[str, Any] = {"base": kind, "base_color": np.array(_color(basic, where))}
-    alpha = max(number(basic, "roughnessFactor", 1.0) ** 2, 1e-3)
+    alpha = words.width(number(basic, "roughnessFactor", 1.0))
     if kind == "mixed":
         found["metallic"] = metallic
     if kind == "glossy":
         found["ior"] = float(np.clip(number(ior, "ior", 1.5), 1.0, 3.0))
     if strength := number(grain, "anisotropyStrength", 0.0):
-        wide, turned = alpha + (1.0 - alpha) * strength**2, abs(math.sin(number(grain, "anisotropyRotation", 0.0))) > 0.5
+        wide, turned = (
+            alpha + (1.0 - alpha) * min(strength, 1.0) ** 2,
+            abs(math.sin(number(grain, "anisotropyRotation", 0.0))) > 0.5,
+        )
         found |= {"alpha_x": alpha if turned else wide, "alpha_y": wide if turned else alpha}
     elif kind != "diffuse":
         found["alpha"] = alpha
     if coated:
-        found["coat_alpha"] = max(number(coat, "clearcoatRoughnessFactor", 0.0) ** 2, 1e-3)
+        found["coat_alpha"] = words.width(number(coat, "clearcoatRoughnessFactor", 0.0))
     return Engine(dialect="gltf", **found)
 
 

@@ -129,7 +129,7 @@ def engine_of(values: dict[str, Any]) -> Engine:
     """The coat over a base of OpenPBR's inputs."""
     coated = values["coat_weight"] > 0.0
     kind = words.base_of(values["base_metalness"], _has_lobe(values, coated))
-    own = values["specular_roughness"] ** 2
+    own = words.width(values["specular_roughness"])
     found: dict[str, Any] = {"base": kind, "base_color": np.multiply(values["base_color"], values["base_weight"])}
     if kind == "mixed":
         found["metallic"] = values["base_metalness"]
@@ -137,13 +137,13 @@ def engine_of(values: dict[str, Any]) -> Engine:
         found["edge_tint"] = np.asarray(values["specular_color"], float)
     if kind == "glossy" and not coated:
         found["ior"] = values["specular_ior"]
-    if ratio := values["specular_roughness_anisotropy"]:
+    if ratio := min(max(values["specular_roughness_anisotropy"], 0.0), 0.999):
         along = own * math.sqrt(2.0 / (1.0 + (1.0 - ratio) ** 2))
         found |= {"alpha_x": max(along, 1e-3), "alpha_y": max(along * (1.0 - ratio), 1e-3)}
     elif kind != "diffuse":
-        found["alpha"] = max(own, 1e-3)
+        found["alpha"] = own
     if coated:
-        found |= {"coat_alpha": max(values["coat_roughness"] ** 2, 1e-3), "coat_ior": values["coat_ior"]}
+        found |= {"coat_alpha": words.width(values["coat_roughness"]), "coat_ior": values["coat_ior"]}
         if min(values["coat_color"]) < 1.0:
             found["coat_tau"] = words.depth(values["coat_color"], 2.0)
         if kind == "glossy":  # two dielectric lobes over a diffuse part: the coat's is the one that is seen

@@ -13,6 +13,11 @@ def roughness(alpha: Any) -> float:
     return digits(math.sqrt(float(alpha)))
 
 
+def width(roughness: float) -> float:
+    """The GGX width of an artist's roughness, no narrower than a layer has it."""
+    return max(min(max(roughness, 0.0), 1.0) ** 2, 1e-3)
+
+
 def widths(engine: Engine) -> tuple[float, float] | None:
     """The greater and the smaller width of a base with a grain; None for one without."""
     if engine.alpha_x is None:
