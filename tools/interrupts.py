@@ -121,9 +121,11 @@ class Trial:
         ended = self.run(out, moment * self.seconds, sent)
         yield from (f"{name} {why}" for name, content in ended.files.items() if (why := whole(name, content)))
         yield from (f"{name} is none of its files" for name in ended.files.keys() - self.names)
-        expected = {signal.SIGINT: 130, signal.SIGKILL: -signal.SIGKILL}[signal.Signals(sent)]
+        expected = {signal.SIGINT: (130, -signal.SIGINT), signal.SIGKILL: (-signal.SIGKILL,)}[
+            signal.Signals(sent)
+        ]  # before and after Python runs
         began = bool(ended.err or ended.code not in (1, -signal.SIGINT))  # else Python itself had not begun
-        if began and (ended.code not in (expected, self.code) or "Traceback" in ended.err):
+        if began and (ended.code not in (*expected, self.code) or "Traceback" in ended.err):
             yield f"exit code {ended.code}: {ended.err[-2000:]}"
         again = self.run(out)
         if again.code != self.code or "Traceback" in again.err or "Warning" in again.err:
