@@ -24,7 +24,7 @@ LONG = ("heat", "lines", "worst")
 
 def pictured(name: str) -> bool:
     """Whether a structure stands for its model."""
-    return "," not in re.sub(r"^\w+( multi)?, ", "", name)
+    return "," not in re.sub(r"^(precise|corrected|faithful|weathered)( multi)?, ", "", name)
 
 
 def maps(document: dict[str, Any]) -> list[str]:
