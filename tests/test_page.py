@@ -215,6 +215,30 @@ def test_pictures_are_compared_pixel_by_pixel(report, pair):
     np.testing.assert_allclose(right, 255.0 * display(pair.fit[10, 27], 1.5), atol=1.0)
 
 
+def test_a_view_comes_back_after_its_driver(browser, tmp_path):
+    """As after a driver's fault, or a laptop that slept: the same picture, without a word of the page's own."""
+    path = tmp_path / "view.html"
+    path.write_text(view.page(read_preset("bare_concrete"), "bare_concrete"))
+    page = browser.new_page(viewport={"width": 500, "height": 500})
+    faults = []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.goto(path.as_uri())
+    until(page, "globalThis.layerfit?.ready")
+    page.evaluate("layerfit.views[0].limit = 2")
+    drawn = "layerfit.views[0].passes === 2"
+    until(page, drawn)
+    first = page.locator(".stage canvas").screenshot()
+    page.evaluate("globalThis.driver = layerfit.views[0].renderer.gl.getExtension('WEBGL_lose_context'); driver.loseContext()")
+    until(page, "layerfit.views[0].renderer.lost")
+    page.evaluate("layerfit.views[0].change()")
+    page.wait_for_timeout(200)
+    page.evaluate("driver.restoreContext()")
+    until(page, f"layerfit.views[0].age === 2 && {drawn}")
+    assert page.locator(".stage canvas").screenshot() == first
+    page.close()
+    assert not faults
+
+
 def test_programs_compute_what_jax_computes(browser, tmp_path):
     """One material of each way to prepare one, in double precision."""
     kinds = (

@@ -65,10 +65,26 @@ class Renderer {
     if (!gl) throw new Error("this browser has no WebGL 2");
     if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this browser cannot draw to float textures");
     this.gl = gl;
+    this.age = 0;
+    this.begin();
+    // A driver may stop, and take all that it held along: it is asked to come back, and views draw anew when it does.
+    this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    this.canvas.addEventListener("webglcontextrestored", () => this.begin());
+  }
+
+  // What every picture needs of the driver; what views have of it is of one age.
+  begin() {
+    const { gl } = this;
+    gl.getExtension("EXT_color_buffer_float");
+    this.age += 1;
     this.meshes = {};
     this.add = this.link(SCREEN, ADD);
     this.show = this.link(SCREEN, SHOW);
     this.nothing = gl.createVertexArray();
+  }
+
+  get lost() {
+    return this.gl.isContextLost();
   }
 
   link(vertex, fragment) {
@@ -78,11 +94,11 @@ class Renderer {
       const shader = gl.createShader(type);
       gl.shaderSource(shader, text);
       gl.compileShader(shader);
-      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !this.lost) throw new Error(gl.getShaderInfoLog(shader));
       gl.attachShader(program, shader);
     }
     gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !this.lost) throw new Error(gl.getProgramInfoLog(program));
     const places = {};
     return { program, at: (name) => (places[name] ??= gl.getUniformLocation(program, name)) };
   }

@@ -17,6 +17,7 @@ class View {
     this.context = canvas.getContext("2d");
     this.fragment = fragment;
     this.material = null;  // compiled when it is first drawn
+    this.age = renderer.age;
     this.values = values;
     this.shape = "sphere";
     this.orbit = { yaw: 0, pitch: 0.17, distance: 5 };
@@ -77,6 +78,12 @@ class View {
     return [[[...point, 0], times([1, 1, 1], KEY.irradiance * this.shares.key)], ...boxes];
   }
 
+  // Forgets what a driver that stopped has taken along.
+  renew() {
+    if (this.age === this.renderer.age) return;
+    Object.assign(this, { age: this.renderer.age, material: null, pass: null, passes: 0 });
+  }
+
   frame() {
     this.material ??= this.renderer.material(this.fragment);
     this.resize();
@@ -133,7 +140,8 @@ function run(views) {
   const frame = (now) => {
     const waited = now - before;
     before = now;
-    const due = views.filter((view) => view.visible && (view.passes < view.limit || !view.pass));
+    views.forEach((view) => view.renew());
+    const due = views.filter((view) => view.visible && !view.renderer.lost && (view.passes < view.limit || !view.pass));
     due.sort((a, b) => a.passes - b.passes);
     for (const view of due) {
       if (performance.now() - now > FRAME_MS) break;  // compiling shaders takes long: one or a few a frame
