@@ -21,6 +21,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "table": (("pyarrow",), "the table of a batch as Parquet, beside CSV"),
     "interchange": (("MaterialX",), "exported .mtlx files validated, and compiled to GLSL"),
     "notebook": (("anywidget",), "materials live in a notebook, with sliders (`lf.live`)"),
+    "digits": (("mpmath",), "what a value should be, to fifty digits (`layerfit stability`)"),
     "plot": (("matplotlib",), "curves and figures in notebooks"),
 }
 """Extras of the package: the packages that each brings, and what these give."""
