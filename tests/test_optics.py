@@ -18,7 +18,7 @@ from layerfit.optics.fresnel import (
 )
 from layerfit.optics.interface import slope_spread, steer
 from layerfit.optics.lazanyi import Lazanyi, fit_lazanyi, fresnel_lazanyi
-from layerfit.optics.medium import refract_about_facet, refract_about_normal
+from layerfit.optics.medium import cosine_below, refract_about_facet, refract_about_normal
 from layerfit.optics.microfacet import density, half_cosine, half_vector, visibility
 
 DTYPES = [np.float64, np.float32]
@@ -216,8 +216,11 @@ def test_total_reflection_leaves_no_direction():
 def test_refraction_about_a_facet_keeps_the_half_vector():
     wi, wo = jnp.array([0.5, 0.1, np.sqrt(0.74)]), jnp.array([-0.2, 0.4, np.sqrt(0.8)])
     h, c = half_vector(wi, wo), half_cosine(wi, wo)
-    below = [refract_about_facet(w, h, c, jnp.asarray(1.5)) for w in (wi, wo)]
+    c_below = cosine_below(c, jnp.asarray(1.5))
+    below = [refract_about_facet(w, h, c, c_below, jnp.asarray(1.5)) for w in (wi, wo)]
     np.testing.assert_allclose(half_vector(*below), h, atol=1e-14)
+    assert float(half_cosine(*below)) == pytest.approx(float(c_below), rel=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(below, axis=1), 1.0, rtol=1e-14)
 
 
 def test_steering_lengthens_the_path_and_keeps_the_azimuth():

@@ -73,10 +73,14 @@ float lf_v_cavity(vec3 wi, vec3 wo) {
     return min(0.25 / max(wi.z * wo.z, 1e-14), 0.5 * NoH_over_c / max(max(wi.z, wo.z), 1e-14));
 }
 
+// Cosine below a boundary of relative index `eta` (Snell's law); 0 under total internal reflection.
+float lf_cosine_below(float c, float eta) {
+    return sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0)) / eta;
+}
+
 // Direction below a facet with normal `h`, c = w.h (Elek 2010 after Weidlich and Wilkie 2007); z may be <= 0.
-vec3 lf_refract_about_facet(vec3 w, vec3 h, float c, float eta) {
-    float c_below = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
-    return (w + (c_below - c) * h) / eta;
+vec3 lf_refract_about_facet(vec3 w, vec3 h, float c, float c_below, float eta) {
+    return w / eta + (c_below - c / eta) * h;
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -135,23 +139,22 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float V = lf_v_cavity(wi, wo);
     float top = F * D * V;
     float G = 4.0 * V * wi.z * wo.z;
-    vec3 wi_below = lf_refract_about_facet(wi, h, c, lf_coat.eta);
-    vec3 wo_below = lf_refract_about_facet(wo, h, c, lf_coat.eta);
+    float c_below = lf_cosine_below(c, lf_coat.eta);
+    vec3 wi_below = lf_refract_about_facet(wi, h, c, c_below, lf_coat.eta);
+    vec3 wo_below = lf_refract_about_facet(wo, h, c, c_below, lf_coat.eta);
     float T12 = lf_transmittance_dielectric(c, lf_coat.eta);
     float t = 1.0 - G + T12 * G;
     bool lit2 = wi_below.z > 0.0 && wo_below.z > 0.0;
     wi = lit2 ? wi_below : vec3(0.0, 0.0, 1.0);
     wo = lit2 ? wo_below : vec3(0.0, 0.0, 1.0);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_base.eta, lf_base.k);
-    D = lf_ggx_d(lf_half_vector(wi, wo), lf_base.alpha);
+    D = lf_ggx_d(h, lf_base.alpha);
     float projection_i = lf_ggx_projection(wi, lf_base.alpha);
     float projection_o = lf_ggx_projection(wo, lf_base.alpha);
     V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    vec3 f = F2 * D * V;
-    vec3 rest = T12 * t * (lit2 ? f : vec3(0.0));
+    vec3 rest = T12 * t * (lit2 ? lf_fresnel_conductor(c_below, lf_base.eta, lf_base.k) * (D * V) : vec3(0.0));
     float path = 1.0 / max(wi_below.z, 1e-14) + 1.0 / max(wo_below.z, 1e-14);
     rest = rest * lf_transmittance(lf_coat.tau, path);
-    f = top + rest;
+    vec3 f = top + rest;
     return lit ? f : vec3(0.0);
 }
 

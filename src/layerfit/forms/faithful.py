@@ -11,9 +11,9 @@ from typing import Any, Literal
 import jax.numpy as jnp
 
 from .._chunk import safe_divide, struct, where
-from .._types import Colour, Vec3
+from .._types import Colour, Scalar, Vec3
 from ..layers import Coat
-from ..optics.medium import refract_about_facet, refract_about_normal, transmittance
+from ..optics.medium import cosine_below, refract_about_facet, refract_about_normal, transmittance
 from ..optics.microfacet import half_cosine, half_vector
 
 
@@ -59,30 +59,44 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Faithful) -> Prepared:
 
 def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Faithful) -> Colour:
     """BRDF [1/sr] of unit directions above the surface."""
-    return _evaluate(prepared.coats, prepared.base, wi, wo, options)
+    return _evaluate(prepared.coats, prepared.base, wi, wo, None, options)
 
 
-def _evaluate(coats: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, options: Faithful) -> Colour:
+Half = tuple[Vec3, Scalar] | None
+"""Half vector of two directions, and its cosine to them, where they are known."""
+
+
+def _evaluate(coats: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, half: Half, options: Faithful) -> Colour:
     # Below the surface, or lost by total internal reflection above: no light. The dummy keeps derivatives finite.
     lit = (wi[2] > 0.0) & (wo[2] > 0.0)
     up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
     wi = where(lit, wi, up)
     wo = where(lit, wo, up)
-    f = _coat_over(coats[0], coats[1:], base, wi, wo, options) if coats else base.evaluate(wi, wo)
+    if coats:
+        f = _coat_over(coats[0], coats[1:], base, wi, wo, half, options)
+    else:
+        f = base.evaluate(wi, wo) if half is None else base.about(wi, wo, *half)
     return where(lit, f, 0.0)
 
 
-def _coat_over(coat: Coat, below: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, options: Faithful) -> Colour:
-    h = half_vector(wi, wo)
-    c = half_cosine(wi, wo)
+def _coat_over(coat: Coat, below: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, half: Half, options: Faithful) -> Colour:
+    if half is None:
+        h = half_vector(wi, wo)
+        c = half_cosine(wi, wo)
+    else:
+        h, c = half
     F = coat.reflectance(c)
     D = coat.density(h)
     V = coat.visibility(wi, wo)
     top = F * D * V
     G = 4.0 * V * wi[2] * wo[2]
+    half = None
     if options.refract_at == "h":
-        wi_below = refract_about_facet(wi, h, c, coat.eta)
-        wo_below = refract_about_facet(wo, h, c, coat.eta)
+        # Bent about it, both keep their half vector: all layers have the same.
+        c_below = cosine_below(c, coat.eta)
+        half = h, c_below
+        wi_below = refract_about_facet(wi, h, c, c_below, coat.eta)
+        wo_below = refract_about_facet(wo, h, c, c_below, coat.eta)
     else:
         wi_below = refract_about_normal(wi, coat.eta)
         wo_below = refract_about_normal(wo, coat.eta)
@@ -93,9 +107,9 @@ def _coat_over(coat: Coat, below: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec
         T12 = coat.transmittance(wi[2])
         T21 = coat.transmittance(wo[2])
     t = (1.0 - G) + T21 * G if options.masked else T21
-    rest = T12 * t * _evaluate(below, base, wi_below, wo_below, options)
+    rest = T12 * t * _evaluate(below, base, wi_below, wo_below, half, options)
     if coat.tau is not None:
-        at_h = half_cosine(wi_below, wo_below)
+        at_h = half_cosine(wi_below, wo_below) if half is None else half[1]
         cos_i, cos_o = (at_h, at_h) if options.absorb_at == "h" else (wi_below[2], wo_below[2])
         path = safe_divide(1.0, cos_i) + safe_divide(1.0, cos_o)
         rest = rest * transmittance(coat.tau, path)

@@ -18,10 +18,15 @@ def refract_about_normal(w: Vec3, eta: Scalar) -> Vec3:
 
 
 @chunk
-def refract_about_facet(w: Vec3, h: Vec3, c: Scalar, eta: Scalar) -> Vec3:
+def cosine_below(c: Scalar, eta: Scalar) -> Scalar:
+    """Cosine below a boundary of relative index `eta` (Snell's law); 0 under total internal reflection."""
+    return safe_sqrt((eta - 1.0) * (eta + 1.0) + c * c) / eta
+
+
+@chunk
+def refract_about_facet(w: Vec3, h: Vec3, c: Scalar, c_below: Scalar, eta: Scalar) -> Vec3:
     """Direction below a facet with normal `h`, c = w.h (Elek 2010 after Weidlich and Wilkie 2007); z may be <= 0."""
-    c_below = safe_sqrt((eta - 1.0) * (eta + 1.0) + c * c)
-    return (w + (c_below - c) * h) / eta
+    return w / eta + (c_below - c / eta) * h
 
 
 @chunk

@@ -75,6 +75,10 @@ class Surface:
         """BRDF [1/sr] of directions above the surface."""
         h = half_vector(wi, wo)
         c = half_cosine(wi, wo)
+        return self.about(wi, wo, h, c)
+
+    def about(self, wi: Vec3, wo: Vec3, h: Vec3, c: Scalar) -> Colour:
+        """The same where the half vector `h` and its cosine to the directions are known."""
         parts: list[Any] = [lobe.reflectance(c) * lobe.shape(wi, wo, h) for lobe in self.lobes]
         if self.diffuse is not None:
             parts.append(self.diffuse.evaluate(wi, wo))
