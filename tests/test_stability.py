@@ -10,8 +10,7 @@ import pytest
 
 from commands import layerfit
 from layerfit._fields import params
-from layerfit.forms.corrected import Corrected
-from layerfit.layers import LAYERS, Coat
+from layerfit.layers import LAYERS
 from layerfit.render import brdf
 from layerfit.report import stability as report
 from layerfit.stability import exact, limits, measure, sweep

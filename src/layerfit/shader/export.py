@@ -63,7 +63,9 @@ class Shader:
         return re.sub(r"^//@ (\w+)$", lambda slot: slots[slot[1]].rstrip("\n"), text, flags=re.M)
 
     def _about(self) -> str:
-        called = "".join(c if c.isprintable() else " " for c in self.name)  # the end of a line would end the comment, and begin code
+        called = "".join(
+            c if c.isprintable() else " " for c in self.name
+        )  # the end of a line would end the comment, and begin code
         if note := getattr(self.stack.base, "note", ""):
             return f"// {called}.\n// Printed by layerfit {__version__}. {note}"
         layers = " over ".join(type(layer).__name__ for layer in (*self.stack.layers, self.stack.base))
