@@ -21,7 +21,19 @@ from .problem import Problem
 from .profile import ABSORBING, Profile, along, deep, lower_limit, scatter, threshold
 from .residuals import NEAR
 from .result import FitResult, Held
-from .starts import COARSE_STEPS, FINE_STEPS, LEVEL, SCREENED, Minimum, distinct, in_sight, ranked, search, space_filling
+from .starts import (
+    COARSE_STEPS,
+    FINE_STEPS,
+    LEVEL,
+    LOOK_STEPS,
+    SCREENED,
+    Minimum,
+    distinct,
+    in_sight,
+    ranked,
+    search,
+    space_filling,
+)
 from .uncertainty import Uncertainty, estimate
 from .weights import misfit
 
@@ -157,10 +169,9 @@ class _Fit:
         problem = self.problem
         drawn = space_filling(problem.free, SCREENED * (self.starts - 1), self.seed)
         first = problem.free.pack(problem.start)
-        (_, effect), *looked = problem.look([first, *drawn], count)
-        order = np.argsort([cost for cost, _ in looked], kind="stable")[: self.starts - 1]
-        points = [first, *(drawn[k] for k in order)]
-        effects = [effect, *(looked[k][1] for k in order)]
+        looked = sorted(problem.look(drawn, count, LOOK_STEPS), key=lambda place: place[1])
+        begun = [*problem.look([first], count, 1), *looked[: self.starts - 1]]
+        points, effects = [first, *(place for place, _, _ in begun[1:])], [effect for _, _, effect in begun]
         seen = [effect > 1e-7 * effect.max() for effect in effects if effect is not None]
         if not seen:
             raise InputError(f"{self.where}: the start gives no finite image; choose other values in [material]")

@@ -187,15 +187,15 @@ class Problem:
         del self.trace[steps:]  # the fit had ended
         return reached
 
-    def look(self, points: Sequence[np.ndarray], count: int) -> list[tuple[float, np.ndarray | None]]:
-        """Of some points, the cost on the first `count` blocks, and how much those change with each parameter; infinite, and None, where
-        the images are not finite."""
+    def look(self, points: Sequence[np.ndarray], count: int, most: int) -> list[tuple[np.ndarray, float, np.ndarray | None]]:
+        """Where some points lead in a few steps on the first `count` blocks, the cost there, and how much those change with each parameter;
+        infinite, and None, where the images are not finite. One step leads nowhere: it evaluates the point."""
         found = []
         for first in range(0, len(points), SIDE_BY_SIDE):
             some = points[first : first + SIDE_BY_SIDE]
-            for state in [self.residuals.steps(u, initial(u), self.bounds, count, 1)[1] for u in some]:
-                loss, gram = float(state.loss), np.asarray(state.gram)
-                found.append((loss, np.sqrt(np.diag(gram))) if np.isfinite(loss) else (np.inf, None))
+            for u, state, _ in [self.residuals.steps(u, initial(u), self.bounds, count, most) for u in some]:
+                loss, effect = float(state.loss), np.sqrt(np.diag(np.asarray(state.gram)))
+                found.append((np.asarray(u), loss, effect) if np.isfinite(loss) else (np.asarray(u), np.inf, None))
         return found
 
     def discrepancy(

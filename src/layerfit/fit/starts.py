@@ -1,6 +1,6 @@
 """Where a fit starts from, and which minima its starts lead to.
 
-Of many points spread over the ranges, the best few are starts beside the given one: a point costs one evaluation on few pixels. All starts are
+Many points spread over the ranges are taken some steps on the fewest pixels, and the best few are starts beside the given one. All starts are
 taken a few steps. Those that have come to one place are one minimum; the best of those places are followed to their ends.
 """
 
@@ -14,6 +14,10 @@ from .parameters import Parametrisation
 SCREENED = 8
 """Points that are looked at for each start that is taken. Films need them: of 60 fits from anywhere 53 found theirs without, 55 with four, 60
 with eight. More starts of fewer steps, halved in between, found fewer in the same time."""
+
+LOOK_STEPS = 5
+"""Steps of each before it is judged. A point alone is judged by its colours, which are soon right, and not by its order of interference: of 100
+fits of a film 11 came to a wrong one when points were judged where they lay, 2 after three steps, none after five."""
 
 COARSE_STEPS = 12
 FINE_STEPS = 60
@@ -53,7 +57,7 @@ Descend = Callable[[Sequence[Minimum], str], Iterable[Minimum]]
 
 def space_filling(free: Parametrisation, count: int, seed: int) -> list[np.ndarray]:
     """Starts spread evenly over the middle of the bounds (R sequence, Roberts 2018); channels of a colour move together, and so does what each
-    reference has for itself. What is of the scene starts as that says."""
+    reference has for itself. What is of the scene starts as that says. Another seed has points of its own, up to a million of them."""
     places = {(f.layer, f.field): None for f in free.free}
     d = len(places)
     g = 2.0
@@ -62,7 +66,7 @@ def space_filling(free: Parametrisation, count: int, seed: int) -> list[np.ndarr
     lower, upper = free.bounds()
     points = []
     for k in range(count):
-        x = (0.5 + (k + 1 + seed) * g ** -np.arange(1, d + 1)) % 1.0
+        x = (0.5 + (k + 1 + seed % 2**20 * count) * g ** -np.arange(1, d + 1)) % 1.0
         u = np.empty(free.size)
         at = dict(zip(places, x, strict=True))
         for f in free.free:
