@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from helpers import COPPER, QUICKLY, STACKS, brdf, brdf_rows, direction
-from layerfit.forms.corrected import edge_reflection, trapped_light
+from layerfit.forms.corrected import Corrected, edge_reflection, trapped_light
 from layerfit.forms.curves import absorbed
+from layerfit.layers import Coat
 from layerfit.optics.flakes import exponential
 from layerfit.optics.fresnel import fresnel_conductor, fresnel_dielectric, transmittance_dielectric
 from layerfit.optics.growth import coverage, onset, partly_grown, tarnish_thickness
@@ -40,7 +41,7 @@ from layerfit.optics.scattering import (
     once_through,
 )
 from layerfit.stack import Stack
-from layerfit.surfaces import Conductor
+from layerfit.surfaces import Conductor, Lambert
 from layerfit.surfaces.cosine import cosine_power
 from layerfit.surfaces.diffuse import oren_nayar_full, oren_nayar_qualitative
 from layerfit.surfaces.grooves import torrance_sparrow_d
@@ -251,6 +252,14 @@ def test_below_the_surface_there_is_nothing_and_no_derivative(name, dtype):
         f, slopes = jax.value_and_grad(lambda *x: jnp.sum(brdf(*x)), (0, 1, 2))(stack, wi, wo)
         assert float(f) == 0.0
         assert all(np.all(np.asarray(leaf) == 0.0) for leaf in jax.tree.leaves(slopes))
+
+
+def test_the_slope_at_matching_indices_is_that_beside_them():
+    """The larger of two equal numbers has half of its slope in either."""
+    up = jnp.array([[0.0, 0.0, 1.0]])
+    at = lambda eta: brdf_rows(Stack((Coat(alpha=0.1, eta=eta, tau=0.3),), Lambert(albedo=0.5), Corrected()), up, up)[0, 0]  # noqa: E731
+    beside = (at(jnp.asarray(1.0 + 1e-6)) - at(jnp.asarray(1.0))) / 1e-6
+    assert float(jax.grad(at)(jnp.asarray(1.0))) == pytest.approx(float(beside), rel=1e-3)
 
 
 def test_narrower_than_the_range_is_still_finite_in_single_precision():

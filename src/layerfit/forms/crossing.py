@@ -46,7 +46,7 @@ def interface_of(coat: Coat, n: Scalar, rough: bool) -> Interface:
         alpha = jnp.zeros_like(alpha)
     # Where light leaves a denser medium for the base the fits do not hold: the interface is smooth there.
     enters = coat.eta >= 1.0
-    eta = jnp.maximum(coat.eta, 1.0)
+    eta = where(coat.eta < 1.0, 1.0, coat.eta)  # not max: at 1 its derivative is half of either side's
     return Interface(
         n=n,
         alpha=alpha,
