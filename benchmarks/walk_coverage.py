@@ -1,6 +1,6 @@
 """Whether sigmas are true where the form is not: fits of images of the random walk, under noise as a path tracer makes it.
 
-    python benchmarks/walk_coverage.py [--fits 200] [--noise 0.2]
+    python benchmarks/walk_coverage.py [--fits 200] [--noise 0.2] [--only NAME]
 
 The image is what light does between the layers, not what the form draws. A pixel is the mean of a random number of contributions of random, very
 unequal size, so that its noise is skewed, with fireflies, and alike in its channels; its standard error is estimated from the same contributions,
@@ -84,10 +84,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--fits", type=int, default=200)
     parser.add_argument("--noise", type=float, default=0.2)
+    parser.add_argument("--only", default="", help="part of the names to run")
     asked = parser.parse_args()
     discrepancy.PLACES = (0.0,)  # the images are drawn at the centres of their pixels
     lf.use_compilation_cache()
-    for name in CASES:
+    for name in (case for case in CASES if asked.only in case):
         with tempfile.TemporaryDirectory() as folder:
             both = pulls(MODELS[name], Path(folder), asked.fits, asked.noise)
         for what, found in zip(("value", "corrected"), both, strict=True):
