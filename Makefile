@@ -4,10 +4,12 @@ export PYTHON
 BIN := .venv/bin
 PYTEST_ARGS ?=
 UPGRADE ?=
+# What touches each package, without the packages that only the tests bring.
+LOWEST := tests/test_cli.py tests/test_exr.py tests/test_scene.py tests/test_spectra.py tests/test_report.py tests/test_batch.py tests/test_cache.py tests/test_documents.py
 LOCK := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --annotation-style line
 
 .DEFAULT_GOAL := help
-.PHONY: demo test run dev lint pytest wheel format docs gallery lock clean help
+.PHONY: demo test run dev lint pytest audit lowest coverage wheel format docs gallery lock clean help
 
 demo: run  ## fit a layered material to a render and print a verified shader, into out/demo
 	$(BIN)/layerfit demo -o out/demo
@@ -24,6 +26,17 @@ lint: dev  ## style and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
+
+audit:  ## known vulnerabilities of the packages that layerfit runs on (needs uv, and asks pypi.org)
+	uv tool run pip-audit --disable-pip --require-hashes -r requirements/run.txt
+
+lowest: dev  ## tests on the lowest versions that pyproject.toml allows (needs uv)
+	uv venv --quiet --clear .venv-lowest
+	uv pip install --quiet --python .venv-lowest/bin/python --resolution lowest-direct ".[metals,table,plot]" --group wheel
+	.venv-lowest/bin/python -m pytest -W default $(LOWEST)
+
+coverage: dev  ## which lines of the source the tests run
+	$(BIN)/pytest --numprocesses auto --dist worksteal --cov layerfit --cov-report term:skip-covered --ignore tests/test_wheel.py $(PYTEST_ARGS)
 
 # Without test_wheel.py, which `make wheel` runs where it belongs.
 pytest: dev  ## the tests, on the source tree; PYTEST_ARGS="-k fresnel" for some of them
@@ -53,7 +66,7 @@ lock:  ## lock the packages that pyproject.toml names (needs uv); UPGRADE=--upgr
 		pyproject.toml --extra digits --extra interchange --extra metals --extra notebook --extra plot --extra table --group dev -o requirements/dev.txt
 
 clean:  ## remove what make made
-	rm -rf .venv .venv-wheel dist out .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-wheel .venv-lowest dist out .pytest_cache .ruff_cache .hypothesis
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
