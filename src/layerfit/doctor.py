@@ -32,9 +32,6 @@ TOOLS: dict[str, tuple[str, str]] = {
 }
 """Programs that some commands call: the Debian package of each, and what it gives."""
 
-SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
-"""What OpenGL drivers without a GPU call themselves."""
-
 PROBE = """\
 #version 330 core
 in vec3 v_sent;
@@ -180,7 +177,7 @@ def _opengl() -> Iterator[Finding]:
 
     gives = "the shader is rendered and compared"
     try:
-        from .shader.gl import renderer, shade_points
+        from .shader.gl import in_software, renderer, shade_points
     except ImportError as error:
         yield Finding("opengl", "driver", False, str(error), True, gives, "pip install --force-reinstall layerfit")
         return
@@ -190,7 +187,7 @@ def _opengl() -> Iterator[Finding]:
     except MachineError as error:
         yield Finding("opengl", "driver", False, str(error).partition(". ")[0], True, gives, _apt("libegl1 libgl1-mesa-dri"))
         return
-    how = "in software" if any(name in driver.lower() for name in SOFTWARE) else "on a GPU"
+    how = "in software" if in_software() else "on a GPU"
     yield Finding("opengl", "driver", True, f"{driver} ({how})", True, gives)
     exact = bool(np.array_equal(back, np.array(SENT, np.float32)))
     found = "what is drawn comes back to the last digit" if exact else f"{back[0].tolist()} came back of {list(SENT[0])}"

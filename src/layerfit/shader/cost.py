@@ -21,7 +21,7 @@ from ..forms.corrected import Corrected
 from ..stack import Stack
 from ..surfaces import Phong
 from .export import Shader, template
-from .gl import compile_points, context, float_target, renderer, set_uniforms
+from .gl import compile_points, context, float_target, in_software, renderer, set_uniforms
 
 MOST_LIGHTS = 8
 SIDE = 1024
@@ -30,9 +30,6 @@ ROUNDS = 30
 LEAST_MS = 10.0
 """One measurement spans as many draws as take this long: a GPU draws a million pixels in less than its timer tells."""
 MOST_DRAWS = 256
-SOFTWARE = ("llvmpipe", "softpipe", "SwiftShader")
-"""Drivers that draw on the processor, in threads of this process. There the processor's time is taken: what their timer queries tell holds the
-waiting for other programs, and was found to be a tenth to twice the work on a busy machine."""
 CELLS = 32
 """Of the grid that covers the target: few triangles, on which a normal still changes from pixel to pixel."""
 
@@ -165,8 +162,8 @@ class _Drawing:
         ]
         self.array = ctx.vertex_array(self.program, content)
         self.size = side, side
-        software = any(name in renderer() for name in SOFTWARE)
-        self.clock = _processor_time if software else _timer_query
+        # What the timer queries of software tell holds the waiting for other programs: a tenth to twice the work on a busy machine.
+        self.clock = _processor_time if in_software() else _timer_query
         self.draws = 1
         self.milliseconds()  # the driver compiles when it first draws
         while self.draws < MOST_DRAWS and self.draws * self.milliseconds() < LEAST_MS:

@@ -53,6 +53,15 @@ def renderer() -> str:
     return f"{info['GL_RENDERER']}, OpenGL {info['GL_VERSION']}"
 
 
+SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
+"""What drivers call themselves that draw on the processor, in threads of this process."""
+
+
+def in_software() -> bool:
+    """Whether the driver draws on the processor."""
+    return any(name in renderer().lower() for name in SOFTWARE)
+
+
 def compile_points(fragment: str, attributes: Mapping[str, int]) -> moderngl.Program:
     """Compile a fragment shader whose inputs come from one point a pixel: `attributes` are input names with their sizes."""
     kinds = {1: "float", 2: "vec2", 3: "vec3", 4: "vec4"}
