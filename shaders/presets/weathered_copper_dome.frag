@@ -466,7 +466,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float sky) {
     vec3 t2 = lf_patina_coat.tau_s * thickness;
     vec3 t3 = t + t2;
     vec3 t4 = t2 / 12.0;
-    float t5 = min(lf_patina_interface.n, 1.0);
+    float t5 = lf_patina_interface.n < 1.0 ? lf_patina_interface.n : 1.0;
     float t6 = t5 / lf_patina_interface.n;
     vec3 total = vec3(0.0);
     vec3 total2 = vec3(0.0);

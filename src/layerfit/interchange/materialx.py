@@ -1,5 +1,6 @@
 """MaterialX's own opinion of a document: its validation, and the BRDF of the GLSL that it prints. The only file that imports MaterialX."""
 
+import importlib
 import importlib.util
 import re
 
@@ -24,9 +25,10 @@ def shader(text: str) -> str:
 
     Raises `MachineError` where MaterialX finds the document at fault: it was written here.
     """
-    import MaterialX as mx  # pyright: ignore[reportMissingImports]
-    import MaterialX.PyMaterialXGenGlsl as glsl  # pyright: ignore[reportMissingImports]
-    import MaterialX.PyMaterialXGenShader as gen  # pyright: ignore[reportMissingImports]
+    # Its modules take their names from compiled ones, which no type checker sees.
+    mx, glsl, gen = (
+        importlib.import_module(f"MaterialX{part}") for part in ("", ".PyMaterialXGenGlsl", ".PyMaterialXGenShader")
+    )
 
     search, library, document = mx.getDefaultDataSearchPath(), mx.createDocument(), mx.createDocument()
     mx.loadLibraries(mx.getDefaultDataLibraryFolders(), search, library)
