@@ -168,6 +168,27 @@ def test_layers_come_back_from_a_coat_over_a_base():
     assert len(diffuse.layers) == 1
 
 
+def test_a_dielectric_keeps_the_widths_of_its_grain(tmp_path):
+    """Over a colour as a coat, over black as a base."""
+    for color, part in ((0.5, "layers"), (0.0, "base")):
+        path = tmp_path / f"{part}.gltf"
+        basic = {"metallicFactor": 0.0, "roughnessFactor": 0.5, "baseColorFactor": [color, color, color, 1.0]}
+        extensions = {gltf.ANISOTROPY: {"anisotropyStrength": 0.5}}
+        path.write_text(json.dumps({"materials": [{"pbrMetallicRoughness": basic, "extensions": extensions}]}))
+        stack = read_start(path)
+        lobe: Any = stack.layers[0] if part == "layers" else stack.base
+        assert lobe.alpha is None
+        assert (float(lobe.alpha_x), float(lobe.alpha_y)) == (0.4375, 0.25)
+
+
+def test_a_tangent_may_have_any_name():
+    text = openpbr.write(conversion(Engine(dialect="openpbr", alpha_x=0.1, alpha_y=0.3)))
+    quoted = openpbr.read(Path("a.mtlx"), text.replace('"across"', '"a\'cross"'))
+    assert float(quoted.alpha_y) == pytest.approx(0.3, rel=1e-4)
+    other = openpbr.read(Path("a.mtlx"), text.replace('nodename="across"', 'nodename="a\'cross"'))
+    assert float(other.alpha_x) == pytest.approx(0.3, rel=1e-4)
+
+
 @pytest.fixture(scope="module")
 def found() -> dict[str, Conversion]:
     """Two materials: a lacquered metal, and one that glTF has words for."""
@@ -310,6 +331,11 @@ def test_a_fit_starts_from_a_material_of_blender(tmp_path, monkeypatch):
     assert base.alpha == 0.25
 
 
+def _surface(name: str, value: str) -> str:
+    """An OpenPBR document with one input."""
+    return f"<materialx><open_pbr_surface name='a'><input name='{name}' value='{value}'/></open_pbr_surface></materialx>"
+
+
 BAD = {
     "a.gltf": ("{}", "no glTF material"),
     "textured.gltf": (
@@ -328,6 +354,13 @@ BAD = {
     "graph.mtlx": (
         "<materialx><open_pbr_surface name='a'><input name='base_color' nodename='b'/></open_pbr_surface></materialx>",
         "comes from a graph or a texture",
+    ),
+    "three.mtlx": (_surface("base_metalness", "0, 0, 0"), "base_metalness = .*: should be a number"),
+    "one.mtlx": (_surface("coat_color", "0.5"), "coat_color = 0.5: should be three numbers"),
+    "word.mtlx": (_surface("coat_ior", "glass"), "coat_ior = 'glass': should be a number"),
+    "digits.gltf": (
+        '{"materials": [{"pbrMetallicRoughness": {"metallicFactor": %s}}]}' % ("9" * 400),
+        "metallicFactor = .*: should be a finite number",
     ),
     "a.json": ('{"schema": "something"}', "not a material of Blender"),
     "a.blend": ("BLENDER", "blender-kit"),

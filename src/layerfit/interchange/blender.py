@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ..documents import is_number
 from ..errors import InputError
 from . import words
 from .convert import Conversion
@@ -106,16 +105,19 @@ def read(path: Path, document: Any) -> Engine:
         raise InputError(
             f'{path}: not a material of Blender: "schema" should be {SCHEMA!r}. `layerfit blender-kit` writes such files'
         )
-    return engine_of(DEFAULTS | {key: _value(value, key, path) for key, value in given.items() if key in DEFAULTS})
+    return engine_of(
+        DEFAULTS
+        | {
+            key: words.checked(_three(value), DEFAULTS[key], f"{path}: {key}")
+            for key, value in given.items()
+            if key in DEFAULTS
+        }
+    )
 
 
-def _value(value: Any, key: str, path: Path) -> Any:
-    wanted = DEFAULTS[key]
-    if isinstance(wanted, list) and isinstance(value, list) and len(value) in (3, 4) and all(map(is_number, value)):
-        return value[:3]
-    if isinstance(wanted, float) and is_number(value):
-        return value
-    raise InputError(f"{path}: {key} = {value!r}: should be {'three numbers' if isinstance(wanted, list) else 'a number'}")
+def _three(value: Any) -> Any:
+    """A colour without its alpha."""
+    return value[:3] if isinstance(value, list) and len(value) == 4 else value
 
 
 def engine_of(values: dict[str, Any]) -> Engine:

@@ -127,17 +127,17 @@ def stack_of(engine: Engine) -> Stack:
     """
     coat_index = 1.0 if engine.coat_alpha is None else engine.coat_ior or COAT_INDEX
     metal = engine.base == "metal" or (engine.base == "mixed" and _number(engine.metallic) >= 0.5)
+    widths = {"alpha": engine.alpha, "alpha_x": engine.alpha_x, "alpha_y": engine.alpha_y}
     if metal:
         eta, k = metal_of(_colour(engine.base_color), None if engine.edge_tint is None else _colour(engine.edge_tint))
-        widths = {"alpha": engine.alpha, "alpha_x": engine.alpha_x, "alpha_y": engine.alpha_y}
         base: Any = Conductor(**widths, eta=np.clip(eta * coat_index, 0.02, 10.0), k=np.clip(k * coat_index, 0.0, 15.0))
     elif engine.base == "glossy" and not _colour(engine.base_color).any():
-        base = Dielectric(alpha=engine.alpha, eta=engine.ior)
+        base = Dielectric(**widths, eta=engine.ior)
     else:
         base = Lambert(albedo=_colour(engine.base_color))
     layers = _coats(engine) if engine.coat_alpha is not None else ()
     if engine.base == "glossy" and isinstance(base, Lambert):  # a dielectric lobe over a diffuse part is a clear coat
-        layers = (Coat(alpha=engine.alpha, eta=engine.ior),)
+        layers = (Coat(**widths, eta=engine.ior),)
     return Stack(layers, base, form_of({}, layers, base, "material"))
 
 

@@ -106,7 +106,7 @@ def read(path: Path, text: str) -> Engine:
 def _turned(root: ET.Element, node: ET.Element) -> bool:
     """Whether the tangent is the bitangent: how a greater width across it is written."""
     linked = node.find("input[@name='geometry_tangent']")
-    return linked is not None and root.find(f"bitangent[@name='{linked.get('nodename')}']") is not None
+    return linked is not None and any(turned.get("name") == linked.get("nodename") for turned in root.findall("bitangent"))
 
 
 def _value(item: ET.Element, path: Path) -> Any:
@@ -119,10 +119,8 @@ def _value(item: ET.Element, path: Path) -> Any:
     try:
         numbers = [float(v) for v in text.split(",")]
     except ValueError:
-        raise InputError(f"{where} = {text!r}: should be a number, or three with commas") from None
-    if len(numbers) not in (1, 3) or not all(map(math.isfinite, numbers)):
-        raise InputError(f"{where} = {text!r}: should be a finite number, or three with commas")
-    return numbers[0] if len(numbers) == 1 else numbers
+        numbers = []
+    return words.checked(numbers[0] if len(numbers) == 1 else numbers or text, DEFAULTS[str(item.get("name"))], where)
 
 
 def engine_of(values: dict[str, Any]) -> Engine:

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from ..documents import is_number
+from ..errors import InputError
 from .engine import Engine
 
 
@@ -58,6 +60,15 @@ def base_of(metallic: float, has_lobe: bool) -> str:
 def color(value: Any) -> list[float]:
     """Three numbers in [0, 1]."""
     return [digits(v) for v in np.clip(np.broadcast_to(np.asarray(value, float), 3), 0.0, 1.0)]
+
+
+def checked(value: Any, default: Any, where: str) -> Any:
+    """A value that is read, of the kind of its default: three numbers for a colour, else one. Raises `InputError` for another."""
+    if isinstance(default, list) and isinstance(value, list) and len(value) == 3 and all(map(is_number, value)):
+        return value
+    if isinstance(default, float) and is_number(value):
+        return value
+    raise InputError(f"{where} = {value!r}: should be {'three numbers' if isinstance(default, list) else 'a number'}")
 
 
 def digits(value: Any) -> float:
