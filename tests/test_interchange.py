@@ -181,6 +181,20 @@ def test_a_dielectric_keeps_the_widths_of_its_grain(tmp_path):
         assert (float(lobe.alpha_x), float(lobe.alpha_y)) == (0.4375, 0.25)
 
 
+def test_a_grain_wider_than_a_layer_has_it_is_the_widest(tmp_path):
+    """Of a rough surface with a strong grain, other programs make a lobe wider than 1."""
+    principled, surface = tmp_path / "a.json", tmp_path / "a.mtlx"
+    inputs = {"Metallic": 1.0, "Roughness": 1.0, "Anisotropic": 0.9}
+    principled.write_text(json.dumps({"schema": blender.SCHEMA, "inputs": inputs}))
+    made = {"base_metalness": 1.0, "specular_roughness": 1.0, "specular_roughness_anisotropy": 0.9}
+    items = "".join(f"<input name='{name}' value='{value}'/>" for name, value in made.items())
+    surface.write_text(f"<materialx><open_pbr_surface name='a'>{items}</open_pbr_surface></materialx>")
+    for path, narrow in ((principled, np.sqrt(1.0 - 0.9 * 0.9)), (surface, 0.1 * np.sqrt(2.0 / 1.01))):
+        base: Any = read_start(path).base
+        assert float(base.alpha_x) == 1.0
+        np.testing.assert_allclose(base.alpha_y, narrow)
+
+
 def test_a_tangent_may_have_any_name():
     text = openpbr.write(conversion(Engine(dialect="openpbr", alpha_x=0.1, alpha_y=0.3)))
     quoted = openpbr.read(Path("a.mtlx"), text.replace('"across"', '"a\'cross"'))

@@ -135,7 +135,7 @@ def engine_of(values: dict[str, Any]) -> Engine:
     if values["Anisotropic"] > 0.0:
         aspect = math.sqrt(1.0 - 0.9 * min(values["Anisotropic"], 1.0))
         turned = abs(math.sin(2.0 * math.pi * values["Anisotropic Rotation"])) > 0.5
-        pair = (alpha / aspect, alpha * aspect)
+        pair = (words.clipped(alpha / aspect), words.clipped(alpha * aspect))
         found |= dict(zip(("alpha_x", "alpha_y"), pair[::-1] if turned else pair, strict=True))
     elif kind != "diffuse":
         found["alpha"] = alpha

@@ -20,8 +20,12 @@ def _part(doc: str, default: float | None = None) -> Any:
     return param(default=default, lower=0.0, upper=1.0, scale="linear", doc=doc, colour=True)
 
 
+NARROWEST, WIDEST = 1e-3, 1.0
+"""GGX widths that an engine takes, as layers have them."""
+
+
 def _width(which: str) -> Any:
-    return param(default=None, lower=1e-3, upper=1.0, scale="log", doc=f"GGX width of {which}: its roughness squared")
+    return param(default=None, lower=NARROWEST, upper=WIDEST, scale="log", doc=f"GGX width of {which}: its roughness squared")
 
 
 def _index(which: str) -> Any:

@@ -14,14 +14,12 @@ from ..optics.fresnel import fresnel_conductor, fresnel_schlick
 from ..preset import form_of
 from ..stack import Stack
 from ..surfaces import Conductor, Dielectric, Lambert
+from . import words
 from .dialects import COAT_INDEX, DIALECTS
 from .engine import GRAZING, Engine
 
 BRIGHT = 0.2
 """Reflectance at normal incidence from which on a lobe beside a diffuse part is a metal's."""
-
-WIDEST, NARROWEST = 1.0, 1e-3
-"""GGX widths that an engine takes."""
 
 
 def copied(stack: Stack, dialect: str) -> Engine:
@@ -87,16 +85,12 @@ def _edge_tint(metal: Any, f0: np.ndarray) -> np.ndarray:
 def _widths(base: Any, lobe: Any) -> dict[str, Any]:
     if getattr(base, "alpha_x", None) is None:
         return {"alpha": _width(lobe)}
-    return {"alpha_x": _clipped(base.alpha_x), "alpha_y": _clipped(base.alpha_y)}
+    return {"alpha_x": words.clipped(base.alpha_x), "alpha_y": words.clipped(base.alpha_y)}
 
 
 def _width(lobe: Any) -> float:
     width = lobe.width
-    return _clipped(math.sqrt(float(width[0]) * float(width[1])) if isinstance(width, tuple) else float(width))
-
-
-def _clipped(alpha: Any) -> float:
-    return float(np.clip(float(alpha), NARROWEST, WIDEST))
+    return words.clipped(math.sqrt(float(width[0]) * float(width[1])) if isinstance(width, tuple) else float(width))
 
 
 def _number(value: Any) -> float:

@@ -137,7 +137,7 @@ def engine_of(values: dict[str, Any]) -> Engine:
         found["ior"] = values["specular_ior"]
     if ratio := min(max(values["specular_roughness_anisotropy"], 0.0), 0.999):
         along = own * math.sqrt(2.0 / (1.0 + (1.0 - ratio) ** 2))
-        found |= {"alpha_x": max(along, 1e-3), "alpha_y": max(along * (1.0 - ratio), 1e-3)}
+        found |= {"alpha_x": words.clipped(along), "alpha_y": words.clipped(along * (1.0 - ratio))}
     elif kind != "diffuse":
         found["alpha"] = own
     if coated:

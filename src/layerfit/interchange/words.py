@@ -7,7 +7,7 @@ import numpy as np
 
 from ..documents import is_number
 from ..errors import InputError
-from .engine import Engine
+from .engine import NARROWEST, WIDEST, Engine
 
 
 def roughness(alpha: Any) -> float:
@@ -16,8 +16,13 @@ def roughness(alpha: Any) -> float:
 
 
 def width(roughness: float) -> float:
-    """The GGX width of an artist's roughness, no narrower than a layer has it."""
-    return max(min(max(roughness, 0.0), 1.0) ** 2, 1e-3)
+    """The GGX width of an artist's roughness."""
+    return clipped(min(max(roughness, 0.0), 1.0) ** 2)
+
+
+def clipped(alpha: Any) -> float:
+    """A GGX width that an engine takes: the nearest, for a program whose lobes may be narrower or wider."""
+    return min(max(float(alpha), NARROWEST), WIDEST)
 
 
 def widths(engine: Engine) -> tuple[float, float] | None:
