@@ -65,6 +65,14 @@ def test_over_paint_another_thickness_of_the_lacquer_helps_most(advice):
     assert min(c.gain for c in advice.candidates) > 0.99, "an image more makes nothing worse"
 
 
+@pytest.mark.parametrize("key", ["free", "also", "each"])
+def test_a_name_that_nothing_has_is_refused(scene, key):
+    read = read_scene(scene)
+    wrong = dataclasses.replace(read, fit=dataclasses.replace(read.fit, **{key: ("coat.alpha", "light.ambient", "coat.alpa")}))
+    with pytest.raises(InputError, match=rf"fit\.{key}: unknown parameter 'coat.alpa' \(did you mean 'coat.alpha'"):
+        advise(wrong)
+
+
 def test_a_light_that_reaches_no_visible_point_brings_nothing(advice):
     reference = advice.candidates[0].image.reference
     away = np.subtract(reference.camera.position, reference.camera.look_at)

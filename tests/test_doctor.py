@@ -100,6 +100,7 @@ def test_the_cache_is_found_and_its_size(tmp_path, monkeypatch):
     shutil.rmtree(tmp_path / "cache")
     (tmp_path / "cache").write_text("a file in its place")
     blocked = doctor._cache()
+    assert "$HOME/" in blocked.fix
     assert not blocked.there
     assert "is a file, not a directory" in blocked.found
 

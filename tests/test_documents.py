@@ -9,6 +9,7 @@ import stat
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from threading import Thread
 
 import numpy as np
@@ -108,6 +109,19 @@ def test_what_is_no_file_is_written_straight(tmp_path):
     reader.join()
     assert read == [b"one"]
     assert path.is_fifo()
+
+
+def test_a_full_device_is_said():
+    with pytest.raises(InputError, match=r"/dev/full: cannot be written: No space left on device"):
+        write_bytes(Path("/dev/full"), b"one")
+
+
+def test_a_directory_in_the_place_of_a_file_leaves_the_others(way, tmp_path):
+    write_files(tmp_path, {"a": "one", "b": "one"})
+    (tmp_path / "c").mkdir()
+    with pytest.raises(InputError, match=r"c: is a directory, where a file goes"):
+        write_files(tmp_path, dict.fromkeys("abc", "another"))
+    assert snapshot(tmp_path) == {"a": b"one", "b": b"one"}
 
 
 NAMES = [f"{k}.json" for k in range(5)]

@@ -206,7 +206,7 @@ def _cache() -> Finding:
     try:
         check_directory(directory)
     except InputError as error:
-        fix = "export JAX_COMPILATION_CACHE_DIR=/tmp/layerfit"
+        fix = 'export JAX_COMPILATION_CACHE_DIR="$HOME/layerfit-cache"'  # not in /tmp, where anyone may put code to be run
         return Finding("cache", "compilation", False, str(error).partition(". ")[0], gives=gives, fix=fix)
     count, size = _contents(directory)
     return Finding("cache", "compilation", True, f"{directory}, {size / 1e6:.0f} MB in {count} files", gives=gives)

@@ -83,11 +83,11 @@ def whole(path: Path) -> Iterator[Path]:
     Until then it has no name, so that a process that is killed leaves nothing behind; where the file system cannot do that, a hidden
     one. What is no file, as a pipe or `/dev/stdout`, is written straight. Raises `InputError` where the file cannot be written.
     """
-    if path.exists() and not path.is_file() and not path.is_dir():
-        yield path
-        return
     hidden = path.with_name(f".{uuid.uuid4().hex}{path.suffix[:9]}")
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            yield path
+            return
         path.parent.mkdir(parents=True, exist_ok=True)
         descriptor = _nameless(path.parent)
         if descriptor is None:
@@ -164,6 +164,9 @@ def write_files(directory: Path, contents: Mapping[str, str | bytes | None]) -> 
     the directory is of one result.
     """
     with one_writer(directory), undisturbed(), contextlib.ExitStack() as files:
+        for name, content in contents.items():
+            if content is not None and (directory / name).is_dir():
+                raise InputError(f"{directory / name}: is a directory, where a file goes. Choose another output directory.")
         for name, content in reversed(list(contents.items())):  # what is entered last leaves first
             if content is None:
                 files.callback((directory / name).unlink, missing_ok=True)

@@ -32,12 +32,16 @@ def fit(
     also: Annotated[
         list[str] | None,
         typer.Option(
-            "--also", help="Parameter to fit beside those that the scene names, such as light.ambient; may be repeated."
+            "--also",
+            help="Parameter to fit beside [fit].free, such as light.ambient, in place of the scene's [fit].also; may be repeated.",
         ),
     ] = None,
     each: Annotated[
         list[str] | None,
-        typer.Option("--each", help="Parameter that every reference has for itself, such as base.alpha; may be repeated."),
+        typer.Option(
+            "--each",
+            help="Parameter that every reference has for itself, such as base.alpha, in place of the scene's [fit].each; may be repeated.",
+        ),
     ] = None,
     profile: Annotated[
         list[str] | None,

@@ -19,8 +19,8 @@ from ..capture.scene import Constant, Directional, Reference, Scene
 from ..errors import InputError
 from ..stack import Stack
 from .blocks import STRATA, arrange, strata
-from .nuisances import depths
-from .parameters import LIGHT, Parametrisation, known_parameters, parametrise, with_fixed
+from .nuisances import depths, of_references
+from .parameters import LIGHT, Parametrisation, parametrise, with_fixed
 from .residuals import Residuals
 from .uncertainty import WEAK_SIGMA
 from .weights import FLOOR_SHARE, MODEL_SHARE, brightness, noise_law
@@ -119,9 +119,12 @@ def advise(
             f"{scene.path}: advice is for renders, which have lights and a camera; this scene has measured BRDFs alone"
         )
     stack = with_fixed(scene.start if stack is None else stack, scene.fit.fixed, f"{where}.fixed")
-    told = {*known_parameters(stack), LIGHT}
-    asked = scene.fit.free and [name for name in scene.fit.free if name in told]
-    stack, free = parametrise(stack, asked, tuple(scene.fit.fixed), where)
+    scenes = of_references(stack, references).keys() - {LIGHT}  # of these, brightness alone is among what is told
+    request = scene.fit
+    asked, also, each = (
+        names and [name for name in names if name not in scenes] for names in (request.free, request.also, request.each)
+    )
+    stack, free = parametrise(stack, asked, tuple(request.fixed), where, also=also or (), each=each or ())
     with jax.enable_x64(True):
         ask = _Asked(scene, stack, free, seed)
         capture = [ask.told(reference) for reference in references]

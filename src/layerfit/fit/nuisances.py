@@ -6,7 +6,7 @@ from typing import Any
 from .._fields import Param
 from ..capture.load import AnyView
 from ..capture.samples import View
-from ..capture.scene import AMBIENT, WHOLE
+from ..capture.scene import AMBIENT, WHOLE, Reference
 from ..errors import InputError
 from ..stack import Stack
 
@@ -42,7 +42,12 @@ def _brightness(what: str, colour: bool) -> Param:
 
 def of_the_scene(stack: Stack, views: Sequence[AnyView]) -> dict[str, tuple[int | None, str, Param]]:
     """Every number beside those of the material, by its name: place of its layer (None for lights), field and range."""
-    named = {light.name for view in views if isinstance(view, View) for light in view.reference.lights} - {""}
+    return of_references(stack, [view.reference for view in views if isinstance(view, View)])
+
+
+def of_references(stack: Stack, references: Sequence[Reference]) -> dict[str, tuple[int | None, str, Param]]:
+    """`of_the_scene`, of references that are not loaded."""
+    named = {light.name for reference in references for light in reference.lights} - {""}
     known: dict[str, tuple[int | None, str, Param]] = {}
     for what in (WHOLE, AMBIENT, *sorted(named)):
         known[f"{LIGHTS}.{what}"] = (None, what, _brightness(what, colour=True))
