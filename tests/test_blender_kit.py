@@ -105,6 +105,61 @@ def test_a_lamp_that_a_scene_has_no_word_for_is_refused(kit, kind):
         kit.lamp(_lamp(type=kind))
 
 
+def _emission(strength: float = 4.0, linked: bool = False) -> Any:
+    plug = lambda value: types.SimpleNamespace(default_value=value, is_linked=linked)  # noqa: E731
+    inputs = {"Color": plug((1.0, 0.5, 0.0, 1.0)), "Strength": plug(strength), "Weight": plug(0.0)}
+    return types.SimpleNamespace(type="EMISSION", inputs=inputs)
+
+
+def test_a_lamp_is_as_bright_as_its_emission_makes_it(kit):
+    tree = types.SimpleNamespace(nodes=[_emission(), types.SimpleNamespace(type="OUTPUT_LIGHT")])
+    words = kit.lamp(_lamp(type="POINT", use_nodes=True, node_tree=tree))
+    np.testing.assert_allclose(words["intensity_rgb"], np.array([400.0, 100.0, 0.0]) / (4.0 * math.pi))
+    for nodes in ([], [_emission(linked=True)], [_emission(), _emission()]):
+        with pytest.raises(kit.Unsuited, match="lit by nodes"):
+            kit.lamp(_lamp(type="POINT", use_nodes=True, node_tree=types.SimpleNamespace(nodes=nodes)))
+
+
+class _Thing:
+    """An object of a scene."""
+
+    def __init__(self, kind: str, hidden: bool = False, instances: str = "NONE"):
+        self.name, self.type, self.hide_render, self.instance_type = kind.lower(), kind, hidden, instances
+
+
+def _collection(*things: Any, children: Any = (), hidden: bool = False, exclude: bool = False) -> Any:
+    collection = types.SimpleNamespace(objects=things, hide_render=hidden)
+    return types.SimpleNamespace(collection=collection, exclude=exclude, children=children)
+
+
+def test_a_lamp_that_is_not_rendered_is_not_told(kit, monkeypatch):
+    seen, inside = _Thing("LIGHT"), _Thing("LIGHT")
+    away = [
+        _collection(_Thing("LIGHT"), hidden=True, children=[_collection(_Thing("LIGHT"))]),
+        _collection(_Thing("LIGHT"), seen, exclude=True, children=[_collection(inside)]),
+    ]
+    root = _collection(seen, _Thing("LIGHT", hidden=True), _Thing("MESH"), children=[*away, _collection(seen)])
+    kit.bpy.context = types.SimpleNamespace(view_layer=types.SimpleNamespace(layer_collection=root))
+    monkeypatch.setattr(kit, "lamp", lambda thing: thing)
+    assert kit.lights() == [seen, inside]
+
+
+def test_what_an_empty_shows_of_a_collection_is_left_out(kit):
+    ball, cube, plain, shows = _Thing("MESH"), _Thing("MESH"), _Thing("EMPTY"), _Thing("EMPTY", instances="COLLECTION")
+    kit.alone(types.SimpleNamespace(objects=[ball, cube, plain, shows]), ball)
+    assert [thing.hide_render for thing in (ball, cube, plain, shows)] == [False, True, False, True]
+
+
+def test_the_exposure_of_a_film_is_one(kit):
+    layer, cycles = types.SimpleNamespace(), types.SimpleNamespace(film_exposure=4.0)
+    image = types.SimpleNamespace()
+    kit.bpy.context = types.SimpleNamespace(view_layer=layer)
+    kit.settings(
+        types.SimpleNamespace(render=types.SimpleNamespace(image_settings=image), cycles=cycles, view_layers=[layer]), 64
+    )
+    assert cycles.film_exposure == 1.0
+
+
 MAKE = """
 import bpy, sys
 from mathutils import Vector

@@ -54,7 +54,7 @@ def render(args):
     scene = bpy.context.scene
     thing = chosen(scene, args.object)
     inputs, told = material(thing)
-    camera_words, lamps = camera(scene), [*lights(scene), *world(scene)]
+    camera_words, lamps = camera(scene), [*lights(), *world(scene)]
     if not lamps:
         raise Unsuited("nothing lights the scene. Add a sun, or give the world a colour")
     alone(scene, thing)
@@ -87,7 +87,8 @@ def alone(scene, thing):
     """Hide all other things from the render: a fit knows of no shadows and of no light between surfaces."""
     thing.hide_render = False
     for other in scene.objects:
-        if other != thing and other.type in GEOMETRY and not other.hide_render:
+        drawn = other.type in GEOMETRY or (other.type == "EMPTY" and other.instance_type == "COLLECTION")
+        if other != thing and drawn and not other.hide_render:
             other.hide_render = True
             print(f"layerfit: {other.name} is left out of the render")
 
@@ -129,9 +130,17 @@ def camera(scene):
     }
 
 
-def lights(scene):
+def lights():
     """A table for each lamp that is rendered."""
-    return [lamp(thing) for thing in scene.objects if thing.type == "LIGHT" and not thing.hide_render]
+    return [lamp(thing) for thing in dict.fromkeys(rendered(bpy.context.view_layer.layer_collection)) if thing.type == "LIGHT"]
+
+
+def rendered(layer):
+    """Objects that a view layer's collection and those in it show in renders. One may be in several."""
+    if layer.collection.hide_render:
+        return []
+    own = [] if layer.exclude else [thing for thing in layer.collection.objects if not thing.hide_render]
+    return own + [thing for child in layer.children for thing in rendered(child)]
 
 
 def lamp(thing):
@@ -140,9 +149,12 @@ def lamp(thing):
     bright = light.energy * 2.0 ** getattr(light, "exposure", 0.0)
     tint = light.temperature_color if getattr(light, "use_temperature", False) else (1.0, 1.0, 1.0)
     rgb = [bright * a * b for a, b in zip(light.color, tint, strict=True)]
-    nodes = light.node_tree.nodes if light.use_nodes and light.node_tree else ()
-    if any(socket.is_linked for node in nodes if node.type == "EMISSION" for socket in node.inputs):
-        raise Unsuited(f"{thing.name} is lit by nodes. Give it a plain colour and strength")
+    if light.use_nodes and light.node_tree:
+        found = [node for node in light.node_tree.nodes if node.type == "EMISSION"]
+        if len(found) != 1 or found[0].inputs["Color"].is_linked or found[0].inputs["Strength"].is_linked:
+            raise Unsuited(f"{thing.name} is lit by nodes. Give it a plain colour and strength")
+        color, strength = found[0].inputs["Color"].default_value, found[0].inputs["Strength"].default_value
+        rgb = [strength * a * b for a, b in zip(rgb, list(color)[:3], strict=True)]
     if light.type == "SUN":
         light.angle = 0.0
         return {
@@ -183,6 +195,7 @@ def settings(scene, samples):
     cycles = scene.cycles
     cycles.samples = samples
     cycles.use_adaptive_sampling = cycles.use_denoising = False
+    cycles.film_exposure = 1.0
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     scene.render.film_transparent = True
     scene.render.use_compositing = scene.render.use_sequencer = scene.render.use_border = scene.render.use_motion_blur = False
