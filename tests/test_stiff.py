@@ -21,7 +21,7 @@ from layerfit.optics.flakes import exponential
 from layerfit.optics.fresnel import fresnel_conductor, fresnel_dielectric, transmittance_dielectric
 from layerfit.optics.growth import coverage, onset, partly_grown, tarnish_thickness
 from layerfit.optics.interface import drift, drift_scale, facet_tilt, second_facet, slope_spread, spread_lengthening, steer
-from layerfit.optics.medium import refract_about_facet, refract_about_normal, transmittance
+from layerfit.optics.medium import cosine_below, refract_about_facet, refract_about_normal, transmittance
 from layerfit.optics.microfacet import (
     beckmann_d,
     beckmann_projection,
@@ -55,6 +55,12 @@ FLOOR = {np.float64: 1e-13, np.float32: 1e-6}
 USUAL = (1e-5, 1e-12)
 """Relative tolerance of a value in float32 and float64, where a row says no other."""
 PAGE = Path(__file__).parents[1] / "docs" / "stability.md"
+
+
+def _refracted(i, o, n):
+    """Cosine to the surface below a facet halfway between two directions."""
+    c = half_cosine(i, o)
+    return refract_about_facet(i, half_vector(i, o), c, cosine_below(c, n), n)[2]
 
 
 def vec(x, y, z):
@@ -127,7 +133,7 @@ CASES = {
         USUAL,
     ),
     "refract_facet": (
-        pair(lambda i, o, n: refract_about_facet(i, half_vector(i, o), half_cosine(i, o), n)[2]),
+        pair(lambda i, o, n: _refracted(i, o, n)),
         [(*UP, *SLANT, 1.5), (*SLANT, *NEAR, 1.0)],
         USUAL,
     ),
