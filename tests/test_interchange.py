@@ -312,6 +312,16 @@ def test_an_export_says_what_is_lost_and_keeps_it_in_the_preset(preset, tmp_path
     assert read_preset(preset).layers[0].name == "coat"
 
 
+def test_an_export_that_cannot_be_written_leaves_the_preset_as_it_is(preset, tmp_path, monkeypatch, found):
+    monkeypatch.setattr(formats, "convert", lambda *_: found["lacquered_copper"])
+    (tmp_path / "folder").mkdir()
+    before = preset.read_bytes()
+    ran = layerfit("export", preset, "--to", "gltf", "-o", tmp_path / "folder")
+    assert ran.code == 2
+    assert "cannot be written" in ran.err
+    assert preset.read_bytes() == before
+
+
 def test_a_script_for_blender_is_python(found):
     made = replace(found["lacquered_copper"], engine=engine("blender", "metal", True))
     text = blender.write(made)

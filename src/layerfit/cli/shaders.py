@@ -83,11 +83,14 @@ def _export_to(preset: Path, to: str, scene: Path | None, output: Path | None) -
 
     use_compilation_cache()
     if output is not None:
-        check_directory(output.parent)  # before the preset is told
-    made = export_to(preset, to, scene)
+        check_directory(output.parent)  # before the work
+    made = export_to(preset, to, scene, output)
     for line in said(made, to):
         say(line)
-    _write(made.text, output)
+    if output is None:
+        tell(made.text)
+    else:
+        say(f"Wrote {output}")
     return Done(made.to_json() | {"to": to, "text": made.text}, ("view", preset))
 
 

@@ -71,10 +71,11 @@ class Export:
         return self.conversion.to_json() | ({} if self.drawn is None else {"error_drawn": self.drawn})
 
 
-def export_to(preset: Path, name: str, scene: Path | None = None) -> Export:
+def export_to(preset: Path, name: str, scene: Path | None = None, output: Path | None = None) -> Export:
     """Convert the material of a preset file to a format, and store in that file what is lost: measured on a scene, or on a sphere.
+    With an output, the file is written there, before the preset is told.
 
-    Raises `InputError` for a format that is not there, and for what cannot be read or drawn.
+    Raises `InputError` for a format that is not there, and for what cannot be read, drawn or written.
     """
     if name not in FORMATS:
         raise InputError(f"--to {name}: should be one of {', '.join(FORMATS)}{nearest(name, FORMATS)}")
@@ -83,6 +84,8 @@ def export_to(preset: Path, name: str, scene: Path | None = None) -> Export:
     text = chosen.write(found)
     drawn = chosen.drawn(found, text)
     made = Export(text, found, drawn, False)
+    if output is not None:
+        write_text(output, text)
     return dataclasses.replace(made, stored=_store(find_preset(preset), name, made.to_json()))
 
 
