@@ -19,7 +19,7 @@ from commands import snapshot
 from layerfit import documents
 from layerfit.batch.table import journal, write_line
 from layerfit.capture.exr import read_exr, write_exr
-from layerfit.documents import whole, write_bytes, write_files
+from layerfit.documents import of_ours, whole, write_bytes, write_files
 from layerfit.errors import InputError
 
 
@@ -122,6 +122,19 @@ def test_a_directory_in_the_place_of_a_file_leaves_the_others(way, tmp_path):
     with pytest.raises(InputError, match=r"c: is a directory, where a file goes"):
         write_files(tmp_path, dict.fromkeys("abc", "another"))
     assert snapshot(tmp_path) == {"a": b"one", "b": b"one"}
+
+
+@pytest.mark.parametrize(
+    ("earlier", "left"),
+    [('{"schema": "layerfit/fit"}', False), (None, True), ('{"schema": "other"}', True), ("[]", True), ("no JSON", True)],
+)
+def test_what_an_earlier_result_did_not_leave_stays(earlier, left, tmp_path):
+    (tmp_path / "planes.png").write_text("of the user")
+    if earlier is not None:
+        (tmp_path / "fit.json").write_text(earlier)
+    files = of_ours(tmp_path, {"planes.png": None, "fit.json": "new"}, "fit.json", "layerfit/fit")
+    write_files(tmp_path, files)
+    assert (tmp_path / "planes.png").exists() == left
 
 
 NAMES = [f"{k}.json" for k in range(5)]

@@ -55,6 +55,20 @@ def test_a_grid_holds_the_ends_of_all_ranges_and_what_is_close_to_them():
     np.testing.assert_array_equal(few[:2], ends.T)
 
 
+@pytest.mark.parametrize("name", ["conductor", "corrected, coat over lambert"])
+def test_a_grid_holds_the_material_that_it_is_given(name):
+    stack = structures()[name]
+    tried = grid(stack, corners=4)
+    assert tried.inputs(tried.default) == {
+        f.name: float(leaf) for f, leaf in zip(tried.free, jax.tree.leaves(stack.astype(np.float32)), strict=True)
+    }
+
+
+def test_what_is_not_finite_is_worst_and_what_has_no_error_is_not():
+    cases = [{"over": over} for over in (0.0, 1e-6, None, 1e-3)]
+    assert [case["over"] for case in sorted(cases, key=sweep._over, reverse=True)] == [None, 1e-3, 1e-6, 0.0]
+
+
 def test_directions_are_unit_vectors_above_the_surface():
     wi, wo, place = directions()
     np.testing.assert_allclose(np.linalg.norm([wi, wo], axis=-1), 1.0, rtol=1e-15)

@@ -19,7 +19,7 @@ from layerfit.layers import Coat
 from layerfit.render import predict
 from layerfit.report.structures import document, sentences
 from layerfit.stack import Stack
-from layerfit.structures import ANY
+from layerfit.structures import ANY, structures_of
 from layerfit.surfaces import CarPaint, Lambert
 from measured_files import write_table
 
@@ -154,6 +154,21 @@ def test_a_fault_is_one_message_and_leaves_nothing(arguments, said, tmp_path, mo
     assert ran.code == 2
     assert said in ran.err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_names_of_a_scene_are_of_its_own_material(tmp_path, monkeypatch):
+    class Chosen(Exception):
+        pass
+
+    def fitted(scene, *_, **__):
+        assert (scene.fit.also, scene.fit.each) == ((), ())
+        raise Chosen
+
+    measurement(tmp_path, lambda wi, wo: values(TRUTHS["diffuse"], wi, wo))
+    (tmp_path / "scene.toml").write_text('[reference]\nbrdf = "a.csv"\n[fit]\nalso = ["coat.tau"]\neach = ["coat.alpha"]\n')
+    monkeypatch.setattr("layerfit.structures.fit_scene", fitted)
+    with pytest.raises(Chosen):
+        structures_of(tmp_path / "scene.toml", tmp_path / "out", structures=["diffuse"])
 
 
 def test_a_scene_needs_no_material_for_it(tmp_path):

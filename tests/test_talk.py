@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 import typer.main
 
@@ -103,6 +104,32 @@ def test_the_gravest_flag_of_a_fit_chooses_the_next_command(flags, words):
     then = [str(word) for word in fitting._after_fit(flags, Path("a.toml"), Path("o"))]
     assert then[: len(words)] == words
     check_command(then)
+
+
+def test_the_next_scene_to_look_at_is_one_without_a_misfit():
+    from pathlib import Path
+
+    rows = [{"scene": f"{k}.toml", "error": "", "misfit": misfit} for k, misfit in enumerate((0.1, None, 0.2))]
+    assert fitting._after_batch(rows, Path("o"))[1] == "1.toml"
+
+
+def test_no_more_corners_are_asked_for_than_there_may_be(monkeypatch):
+    monkeypatch.setattr("layerfit.stability.sweep.stability_of", lambda *_, **__: {"good": True})
+    monkeypatch.setattr("layerfit.report.stability.table", lambda document: "")
+    assert (
+        layerfit("stability", "lambert", "--corners", 65536)
+        .err.splitlines()[-1]
+        .startswith("Next: layerfit stability lambert --corners 65536")
+    )
+
+
+def test_a_black_reference_has_a_misfit():
+    from types import SimpleNamespace
+
+    from layerfit.fit.weights import misfit
+
+    black = np.zeros((4, 3))
+    assert misfit([black], [SimpleNamespace(target=black, noise=None)], [np.ones((4, 3))]) == 0.0
 
 
 def on_terminal(**environment):

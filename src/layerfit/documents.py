@@ -175,6 +175,18 @@ def write_files(directory: Path, contents: Mapping[str, str | bytes | None]) -> 
             place.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def of_ours(
+    directory: Path, contents: Mapping[str, str | bytes | None], document: str, schema: str
+) -> dict[str, str | bytes | None]:
+    """The files of a result without those that it does not have, but where the document of an earlier one stands: what is named alike
+    elsewhere is the user's, and stays."""
+    try:
+        earlier = json.loads((directory / document).read_text(encoding="utf-8")).get("schema") == schema
+    except (OSError, ValueError, AttributeError, RecursionError):
+        earlier = False
+    return {name: content for name, content in contents.items() if earlier or content is not None}
+
+
 @contextlib.contextmanager
 def one_writer(directory: Path) -> Iterator[None]:
     """Make a directory, and wait until no other process writes to it. What is held is given back when the process ends, in whatever way."""

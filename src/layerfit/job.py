@@ -18,7 +18,7 @@ from .capture.measured.sphere import sphere_of
 from .capture.measured.view import MeasuredView
 from .capture.samples import Samples, View
 from .capture.scene import Scene, read_scene
-from .documents import check_directory, finite, write_bytes, write_files
+from .documents import check_directory, finite, of_ours, write_bytes, write_files
 from .errors import InputError
 from .fit.advise import advise
 from .fit.fit import fit
@@ -142,7 +142,7 @@ def fit_scene(
         "report.html": html.page(name, document, pairs, picture, trace, shader.text(), live, in_planes),
         "fit.json": json.dumps(document, indent=2, allow_nan=False) + "\n",
     }
-    write_files(directory, files)
+    write_files(directory, of_ours(directory, files, "fit.json", document["schema"]))
     written = [name for name, content in files.items() if content is not None]
     return Outcome(document, directory, result.converged and parity.passed, written)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from .capture.load import load
 from .capture.scene import FitRequest, Scene, read_scene
-from .documents import check_directory, finite, write_files
+from .documents import check_directory, finite, of_ours, write_files
 from .errors import InputError
 from .fit.fit import fit
 from .fit.parameters import known_parameters, with_fixed
@@ -107,7 +107,7 @@ def specialise(
         "specialise.html": report.page(document),
         "specialise.json": json.dumps(document, indent=2, allow_nan=False) + "\n",
     }
-    write_files(directory, files)
+    write_files(directory, of_ours(directory, files, "specialise.json", SCHEMA))
     kept.done()
     return Told(document, report.table(document), *document["in_words"])
 

@@ -51,8 +51,8 @@ def structures_of(
 ) -> StructuresOutcome:
     """Choose the structure that a scene or a measured BRDF supports, fit it, and write all to `directory`.
 
-    A scene's `free` and `fixed` are of its own material and are not used. `min_half_deg` is for a measured BRDF that is named itself. Raises
-    `LayerfitError` for input or a machine that is at fault.
+    A scene's `free`, `also`, `each` and `fixed` are of its own material and are not used. `min_half_deg` is for a measured BRDF that is
+    named itself. Raises `LayerfitError` for input or a machine that is at fault.
     """
     path, directory = Path(path), Path(directory)
     scene = _scene(path, min_half_deg)
@@ -60,7 +60,7 @@ def structures_of(
     searching = lambda stage, share: progress(stage, SEARCH * share)  # noqa: E731
     choice = choose_structure(load(scene), structures=structures, metric=metric, seed=seed, progress=searching)
     found = choice.chosen
-    request = dataclasses.replace(scene.fit, free=found.candidate.free, fixed={}, metric=metric, seed=seed)
+    request = dataclasses.replace(scene.fit, free=found.candidate.free, also=(), each=(), fixed={}, metric=metric, seed=seed)
     outcome = fit_scene(dataclasses.replace(scene, start=found.result.stack, fit=request), directory, progress=progress)
     document = report.document(choice)
     text = json.dumps(document, indent=2, allow_nan=False) + "\n"

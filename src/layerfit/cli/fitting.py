@@ -1,5 +1,6 @@
 """Commands that fit: `fit`, `structures`, and `advise`, which is asked before a fit."""
 
+import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -219,7 +220,9 @@ def batch(
 
 def _after_batch(rows: Sequence[Any], output: Path) -> tuple[Any, ...]:
     """A closer look at a scene that failed, else at the one that is fitted worst."""
-    row = next((row for row in rows if row["error"]), None) or max(rows, key=lambda row: row["misfit"])
+    row = next((row for row in rows if row["error"]), None) or max(
+        rows, key=lambda row: math.inf if row["misfit"] is None else row["misfit"]
+    )
     return "fit", row["scene"], "-o", output / Path(row["scene"]).stem
 
 

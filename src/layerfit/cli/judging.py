@@ -9,6 +9,9 @@ import typer
 from .app import Force, Output, Preset, Scene, command
 from .talk import Done, progress, say, show
 
+CORNERS = 65536
+"""Corners of a structure's ranges that are tried at most."""
+
 
 @command()
 def truth(
@@ -132,7 +135,7 @@ def stability(
         str, typer.Argument(help="Part of the name of structures: precise, conductor, patina. Left out: all of them.")
     ] = "",
     output: Output = Path("out"),
-    corners: Annotated[int, typer.Option(min=2, max=65536, help="Corners of the ranges of a structure, at most.")] = 128,
+    corners: Annotated[int, typer.Option(min=2, max=CORNERS, help="Corners of the ranges of a structure, at most.")] = 128,
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of the corners that are drawn.")] = 0,
     shaders: Annotated[bool, typer.Option(help="Draw the printed shaders too.")] = True,
     digits: Annotated[
@@ -157,4 +160,4 @@ def stability(
     show(table(document))
     say(f"Wrote stability.json, stability.md and heat/ in {output}/")
     words = (word,) if word else ()
-    return Done(document, ("stability", *words, "--corners", 8 * corners, "-o", output), document["good"])
+    return Done(document, ("stability", *words, "--corners", min(8 * corners, CORNERS), "-o", output), document["good"])

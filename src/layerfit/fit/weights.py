@@ -111,4 +111,4 @@ def misfit(models: Sequence[np.ndarray], samples: Sequence[Samples], weights: Se
         image += np.sum((seen.target * weight).astype(float) ** 2)
         if seen.noise is not None:
             noise += np.sum((np.nan_to_num(seen.noise, posinf=0.0) * weight).astype(float) ** 2)
-    return float(np.sqrt(max(residual - noise, 0.0) / image))
+    return float(np.sqrt(max(residual - noise, 0.0) / max(image, 1e-30)))

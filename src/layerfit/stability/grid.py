@@ -33,6 +33,8 @@ class Grid:
     values: np.ndarray
     lines: dict[str, np.ndarray]
     """Rows along each parameter, by its name, ascending."""
+    default: int
+    """The row of the material that the structure is given with."""
 
     def stack(self, template: Stack, dtype: Any, rounded: bool = True) -> Stack:
         """All materials as one, every number an array (m,), rounded to float32 in every precision."""
@@ -69,7 +71,7 @@ def grid(stack: Stack, corners: int, seed: int = 0) -> Grid:
         rows[-1][:, k] = along
         lines[f.name] = count + np.arange(len(along))
         count += len(along)
-    return Grid(free, np.concatenate(rows), lines)
+    return Grid(free, np.concatenate([*rows, start[None]]), lines, count)
 
 
 def _corners(free: tuple[Free, ...], most: int, seed: int) -> np.ndarray:

@@ -20,7 +20,7 @@ MATERIALS = 6
 
 def printed(stack: Stack, tried: Grid, seed: int = 0) -> dict[str, Any]:
     """Shader against JAX: the defaults, the two ends of all ranges, and corners between."""
-    rows = [int(next(iter(tried.lines.values()))[0]), 0, 1, *range(2, len(tried.values))][:MATERIALS]
+    rows = [tried.default, 0, 1, *range(2, len(tried.values))][:MATERIALS]
     shared = _with_uniforms(stack)
     wi, wo = random_pairs(PAIRS, seed)
     samples = wi[:, None], wo, np.ones_like(wi)[:, None], random_places(PAIRS, seed)

@@ -22,7 +22,7 @@ from ..study.kept import Kept
 from . import limits, shader
 from .digits import numbers
 from .exact import in_exact, judged
-from .grid import CLOSE, POLAR_DEG, Grid, directions, grid
+from .grid import POLAR_DEG, Grid, directions, grid
 from .measure import Values, plain_values, slope_error, value_error, values_of
 from .models import structures
 from .tier import try_compact
@@ -81,7 +81,7 @@ def sweep(
 
 
 def _document(found: list[dict[str, Any]], effort: Effort) -> dict[str, Any]:
-    worst = sorted((case for entry in found for case in entry["worst"]), key=lambda case: -(case["over"] or math.inf))[:WORST]
+    worst = sorted((case for entry in found for case in entry["worst"]), key=_over, reverse=True)[:WORST]
     return {
         "schema": "layerfit/stability",
         "version": 2,
@@ -95,6 +95,11 @@ def _document(found: list[dict[str, Any]], effort: Effort) -> dict[str, Any]:
     }
 
 
+def _over(case: Mapping[str, Any]) -> float:
+    """Its error; what is kept without one is not finite."""
+    return math.inf if case["over"] is None else case["over"]
+
+
 def try_structure(name: str, stack: Stack, effort: Effort = Effort()) -> dict[str, Any]:
     """One structure: how many digits float32 has of values and derivatives, what is not finite, and what physics says and does not hold."""
     tried = grid(stack, effort.corners, effort.seed)
@@ -102,8 +107,7 @@ def try_structure(name: str, stack: Stack, effort: Effort = Effort()) -> dict[st
     single, double = (values_of(tried.stack(stack, dtype), wi, wo, dtype) for dtype in (np.float32, np.float64))
     value, slope = value_error(single.f, double.f), slope_error(single, double, tried)
     breaks = limits.breaks(tried, plain_values(tried.stack(stack, np.float64, rounded=False), wi, wo))
-    default = int(next(iter(tried.lines.values()))[len(CLOSE)])
-    made = try_compact(stack, tried, [default, 0][: effort.compact], (wi, wo), effort.shaders) if effort.compact else None
+    made = try_compact(stack, tried, [tried.default, 0][: effort.compact], (wi, wo), effort.shaders) if effort.compact else None
     lost = sum(np.sum(~np.isfinite(part)) for part in (single.f, single.slopes, double.f, double.slopes, *single.gradients))
     entry = {
         "name": name,
@@ -117,7 +121,7 @@ def try_structure(name: str, stack: Stack, effort: Effort = Effort()) -> dict[st
         "breaks": breaks,
         "shader": shader.printed(stack, tried, effort.seed) if effort.shaders else None,
         "compact": made,
-        "digits": _digits(stack, tried, (single, double), (value, slope.max(0)), default, effort) if effort.digits else None,
+        "digits": _digits(stack, tried, (single, double), (value, slope.max(0)), effort) if effort.digits else None,
         "heat": {key: _heat(value[rows], polar) for key, rows in tried.lines.items()},
         "lines": {f.name: tried.values[tried.lines[f.name], k].tolist() for k, f in enumerate(tried.free)},
         "worst": [*_worst(name, tried, value, single, double, (wi, wo))],
@@ -137,13 +141,12 @@ def _digits(
     tried: Grid,
     values: tuple[Values, Values],
     errors: tuple[np.ndarray, np.ndarray],
-    default: int,
     effort: Effort,
 ) -> dict[str, Any]:
     """The materials with the largest errors of a value and of a slope, the defaults, and others: in 50 digits."""
     pairs = [w.astype(np.float32) for w in directions()[:2]]
     drawn = np.random.default_rng((effort.seed, 2)).integers(0, len(tried.values), effort.digits).tolist()
-    rows = list(dict.fromkeys([*(int(np.argmax(error.max(1))) for error in errors), default, *drawn]))
+    rows = list(dict.fromkeys([*(int(np.argmax(error.max(1))) for error in errors), tried.default, *drawn]))
     rows = rows[: 1 if isinstance(stack.form, Precise) else effort.digits]  # a precise one takes a minute
     worst = np.stack([np.argmax(error, 1) for error in errors])
     cases = in_exact(stack, tried, (pairs[0], pairs[1]), rows, worst, values[1], effort.seed)
