@@ -313,6 +313,7 @@ def test_a_driver_that_miscompiles_gets_no_shader(scene, gl, tmp_path, monkeypat
 
     monkeypatch.setattr("layerfit.job.check_image", miscompiled)
     (tmp_path / "material.frag").write_text("of an earlier fit")
+    (tmp_path / "fit.json").write_text('{"schema": "layerfit/fit"}')
     ran = layerfit("fit", scene, "-o", tmp_path, "--starts", "1", "--json")
     assert row, "a pixel of the sphere"
     assert ran.code == 1
