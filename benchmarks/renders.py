@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from layerfit.capture.scene import Scene, read_scene
+from layerfit.capture.scene import Scene
+from layerfit.capture.scene_file import read_scene
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from commands import layerfit, write_reference
-from layerfit.capture.scene import read_scene
+from layerfit.capture.scene_file import read_scene
 from layerfit.errors import InputError
 from layerfit.fit.advise import STRATA, Advice, Told, _told, advise
 from layerfit.fit.parameters import parametrise

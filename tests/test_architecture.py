@@ -45,7 +45,7 @@ TOP = [
     {"interchange"},
     {"study"},
     {"report"},
-    {"tabulate", "job", "truth", "structures", "stability", "cache", "view", "doctor", "plot"},
+    {"tabulate", "drawings", "job", "truth", "structures", "stability", "cache", "view", "doctor", "plot"},
     {"batch", "tradeoffs", "specialising", "notebook"},
     {"demo"},
     {""},

@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 
 from commands import layerfit
-from layerfit.capture.scene import Constant, Directional, Point, SphereLight, read_scene
+from layerfit.capture.scene import Constant, Directional, Point, SphereLight
+from layerfit.capture.scene_file import read_scene
 from layerfit.interchange import blender, formats
 from layerfit.interchange.mapping import alone
 from layerfit.interchange.stage import draw, scene_views

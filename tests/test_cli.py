@@ -311,7 +311,7 @@ def test_a_driver_that_miscompiles_gets_no_shader(scene, gl, tmp_path, monkeypat
         image[row, 1] *= 1.01
         return check_image(image, model, index, width)
 
-    monkeypatch.setattr("layerfit.job.check_image", miscompiled)
+    monkeypatch.setattr("layerfit.drawings.check_image", miscompiled)
     (tmp_path / "material.frag").write_text("of an earlier fit")
     (tmp_path / "fit.json").write_text('{"schema": "layerfit/fit"}')
     ran = layerfit("fit", scene, "-o", tmp_path, "--starts", "1", "--json")

@@ -16,14 +16,8 @@ import pytest
 
 from commands import check_command
 from layerfit.capture.channels import ROLES
-from layerfit.capture.scene import (
-    _LIGHTS,
-    Camera,
-    FitRequest,
-    Reference,
-    Sphere,
-    read_scene,
-)
+from layerfit.capture.scene import Camera, FitRequest, Reference, Sphere
+from layerfit.capture.scene_file import LIGHTS, read_scene
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
@@ -208,7 +202,7 @@ def test_whole_shaders_are_valid(text, tmp_path):
 def test_every_key_of_a_scene_is_described():
     text = (REPOSITORY / "docs" / "scenes.md").read_text()
     fields = {f.name for record in (Camera, Sphere, FitRequest) for f in dataclasses.fields(record)}
-    lights = {key for _, readers in _LIGHTS.values() for key in readers} | set(_LIGHTS)
+    lights = {key for _, readers in LIGHTS.values() for key in readers} | set(LIGHTS)
     reference = {f.name for f in dataclasses.fields(Reference)} - {"lights", "channels"}
     missing = {key for key in fields | lights | reference | set(ROLES) if f"`{key}`" not in text}
     assert not missing

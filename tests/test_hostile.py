@@ -15,7 +15,7 @@ import pytest
 from commands import SCENE, TRUTH
 from layerfit.capture.exr import read_exr
 from layerfit.capture.measured.read import read_brdf
-from layerfit.capture.scene import read_scene
+from layerfit.capture.scene_file import read_scene
 from layerfit.errors import InputError, LayerfitError
 from layerfit.preset import read_preset
 from measured_files import write_cornell, write_rgl, write_tensors

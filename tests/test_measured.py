@@ -14,7 +14,8 @@ from layerfit.capture.measured.data import half_angle
 from layerfit.capture.measured.read import read_brdf
 from layerfit.capture.measured.rgl import bilinear, warped
 from layerfit.capture.measured.sphere import coordinates, interpolated, sphere_of
-from layerfit.capture.scene import METRICS, read_scene
+from layerfit.capture.scene import METRICS
+from layerfit.capture.scene_file import read_scene
 from layerfit.errors import InputError
 from layerfit.fit.difference import compared, curve
 from layerfit.fit.fit import fit

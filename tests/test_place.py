@@ -14,7 +14,7 @@ from layerfit._fields import layer, param
 from layerfit._place import Place
 from layerfit.capture.geometry import sphere_tangent, sphere_uv
 from layerfit.capture.load import load
-from layerfit.capture.scene import read_scene
+from layerfit.capture.scene_file import read_scene
 from layerfit.errors import InputError
 from layerfit.fit.fit import fit
 from layerfit.forms.faithful import Faithful

@@ -11,7 +11,8 @@ from helpers import COPPER
 from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import sphere_surface
 from layerfit.capture.samples import load_reference
-from layerfit.capture.scene import Camera, Constant, Directional, Reference, Sphere, read_scene
+from layerfit.capture.scene import Camera, Constant, Directional, Reference, Sphere
+from layerfit.capture.scene_file import read_scene
 from layerfit.errors import InputError
 from layerfit.fit.fit import fit
 from layerfit.fit.parameters import parametrise

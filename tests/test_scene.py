@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from helpers import STACKS
-from layerfit.capture.scene import Directional, EnvironmentMap, Point, read_scene
+from layerfit.capture.scene import Directional, EnvironmentMap, Point
+from layerfit.capture.scene_file import read_scene
 from layerfit.documents import write_text
 from layerfit.errors import InputError
 from layerfit.forms.corrected import Corrected

@@ -10,7 +10,8 @@ from commands import layerfit
 from helpers import hemisphere, sphere_view
 from layerfit.capture.load import load
 from layerfit.capture.measured.view import load_measured
-from layerfit.capture.scene import MeasuredReference, read_scene
+from layerfit.capture.scene import MeasuredReference
+from layerfit.capture.scene_file import read_scene
 from layerfit.errors import InputError
 from layerfit.fit.candidates import candidates
 from layerfit.fit.structures import STRONG, _asked, choose_structure, effective

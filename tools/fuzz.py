@@ -28,7 +28,7 @@ import numpy as np
 from layerfit._data import references
 from layerfit.capture.exr import read_exr, write_exr
 from layerfit.capture.measured.read import read_brdf
-from layerfit.capture.scene import read_scene
+from layerfit.capture.scene_file import read_scene
 from layerfit.errors import InputError
 from layerfit.preset import preset_of, read_preset
 from layerfit.shipped import shipped_presets

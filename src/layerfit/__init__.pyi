@@ -8,7 +8,8 @@ from .capture.load import load as load
 from .capture.measured.data import MeasuredBrdf as MeasuredBrdf
 from .capture.measured.read import read_brdf as read_brdf
 from .capture.samples import Samples as Samples, View as View
-from .capture.scene import Scene as Scene, read_scene as read_scene
+from .capture.scene import Scene as Scene
+from .capture.scene_file import read_scene as read_scene
 from .errors import InputError as InputError, LayerfitError as LayerfitError, MachineError as MachineError
 from .fit.advise import Advice as Advice, advise as advise
 from .fit.fit import fit as fit

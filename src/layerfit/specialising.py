@@ -10,7 +10,8 @@ import jax
 import numpy as np
 
 from .capture.load import load
-from .capture.scene import FitRequest, Scene, read_scene
+from .capture.scene import FitRequest, Scene
+from .capture.scene_file import read_scene
 from .documents import check_directory, finite, of_ours, write_files
 from .errors import InputError
 from .fit.fit import fit

@@ -8,7 +8,8 @@ from typing import Any
 
 from .capture.load import load
 from .capture.measured.read import is_measured
-from .capture.scene import FitRequest, MeasuredReference, Scene, read_scene
+from .capture.scene import FitRequest, MeasuredReference, Scene
+from .capture.scene_file import read_scene
 from .documents import check_directory, write_files
 from .fit.structures import choose_structure
 from .forms.corrected import Corrected

@@ -13,7 +13,8 @@ import numpy as np
 
 from . import truth
 from .capture.load import AnyView, load
-from .capture.scene import Scene, read_scene
+from .capture.scene import Scene
+from .capture.scene_file import read_scene
 from .documents import check_directory, write_files
 from .errors import InputError
 from .fit.words import structure

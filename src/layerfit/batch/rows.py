@@ -4,7 +4,7 @@ import time
 from typing import Any
 
 from ..capture.load import load
-from ..capture.scene import read_scene
+from ..capture.scene_file import read_scene
 from ..errors import LayerfitError
 from ..fit.result import correlations, flags, parameters
 from ..fit.words import structure

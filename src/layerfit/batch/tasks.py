@@ -9,7 +9,7 @@ from glob import glob
 from pathlib import Path
 from typing import Any
 
-from ..capture.scene import read_scene
+from ..capture.scene_file import read_scene
 from ..errors import InputError, LayerfitError
 
 

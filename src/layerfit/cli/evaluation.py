@@ -25,8 +25,8 @@ def render(
 
     use_compilation_cache()
     from ..capture.load import load
-    from ..capture.scene import read_scene
-    from ..job import write_render
+    from ..capture.scene_file import read_scene
+    from ..drawings import write_render
     from ..preset import read_preset
 
     written = write_render(read_preset(preset), load(read_scene(scene), 0.0), output)

@@ -92,7 +92,7 @@ def _starting(scene: Path, start: Path) -> Any:
     """A scene whose fit starts from another material."""
     import dataclasses
 
-    from ..capture.scene import read_scene
+    from ..capture.scene_file import read_scene
     from ..interchange.formats import read_start
 
     stack = read_start(start)
@@ -248,7 +248,7 @@ def advise(
     from ..cache import use_compilation_cache
 
     use_compilation_cache()
-    from ..capture.scene import read_scene
+    from ..capture.scene_file import read_scene
     from ..job import write_advice
     from ..preset import read_preset
     from ..report.advice import lines

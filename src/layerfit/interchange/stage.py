@@ -9,7 +9,8 @@ from .._place import narrowed
 from ..capture.geometry import normalise, sphere_surface, sphere_tangent, sphere_uv
 from ..capture.load import AnyView, load
 from ..capture.samples import Samples, View
-from ..capture.scene import Camera, Directional, Light, Reference, Sphere, read_scene
+from ..capture.scene import Camera, Directional, Light, Reference, Sphere
+from ..capture.scene_file import read_scene
 from ..forms.corrected import Corrected
 from ..render import predict
 from ..stack import Stack
