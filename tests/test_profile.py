@@ -90,6 +90,18 @@ def test_the_scatter_is_that_of_the_residuals_whatever_the_weights_expect(slot):
     assert scatter(GRAM, 3.0 * np.linalg.inv(GRAM), slot) == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize("slot", range(len(GRAM)))
+def test_the_scatter_does_not_know_of_a_parameter_that_hardly_has_an_effect(slot):
+    """Its column is parallel to another, and so small that the covariance leaves it out."""
+    n = len(GRAM)
+    gram, covariance = np.zeros((n + 1, n + 1)), np.full((n + 1, n + 1), 0.0)
+    gram[:n, :n] = GRAM
+    gram[n, :n] = gram[:n, n] = 1e-20 * GRAM[0]
+    gram[n, n] = 1.01e-40 * GRAM[0, 0]
+    covariance[:n, :n], covariance[n, n] = 3.0 * np.linalg.inv(GRAM), np.inf
+    assert scatter(gram, covariance, slot) == pytest.approx(3.0)
+
+
 DEEP = Stack((Coat(alpha=0.12, eta=1.5, tau=[6.0, 6.0, 0.5]),), Conductor(alpha=0.2, **COPPER))
 
 

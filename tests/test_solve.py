@@ -134,6 +134,23 @@ def test_a_step_that_the_bounds_turn_uphill_is_shortened():
     np.testing.assert_allclose(y, [0.0, 3.5 - 0.99 * 3.0], atol=1e-4)  # on the bound, and where the slope along it ends
 
 
+@pytest.mark.parametrize("depth", [2.0, 8.0, 30.0, 90.0])
+def test_a_start_below_which_nothing_is_seen_is_left(depth):
+    """Slopes of exp(-90), and plain ones beside them: as of a clear coat over a base that a deep one hides."""
+
+    def coated(f):
+        width, colour, level = f
+        return X / width + colour[:, None] * jnp.exp(-level * (1.0 + X))
+
+    truth = np.array([0.7, 0.5, 1.0, 0.8, 1.0])
+    target = np.asarray(coated(fields(jnp.asarray(truth))))
+    start = np.array([1.5, 0.4, 0.9, 0.9, depth])
+    lower, upper = np.array([0.1, 0.0, 0.0, 0.0, 0.0]), np.array([3.0, 1.0, 1.0, 1.0, 100.0])
+    u, state, _ = minimise(start, lower, upper, target, lambda f, target: coated(f) - target)
+    assert state.done
+    np.testing.assert_allclose(u, truth, rtol=1e-4)
+
+
 def test_a_descent_is_the_same_steps_in_one_call():
     start, target = [0.3, 1.0, 1.0, 1.0, 1.0], jnp.asarray(TARGET)
     bounds = np.full(5, -np.inf), np.full(5, np.inf)

@@ -80,10 +80,12 @@ def scatter(gram: np.ndarray, covariance: np.ndarray, slot: int) -> float:
     that is not seen."""
     if not np.isfinite(covariance[slot, slot]):
         return 0.0
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    unit = np.sum(vectors[slot] ** 2 / np.maximum(values, BLIND)) / scale[slot] ** 2
-    return float(covariance[slot, slot] / unit)
+    seen = np.flatnonzero(np.isfinite(np.diag(covariance)))  # what has no effect is not in the covariance of the others
+    at = np.ix_(seen, seen)
+    scale = np.sqrt(np.diag(gram)[seen])
+    values, vectors = np.linalg.eigh(gram[at] / np.outer(scale, scale))
+    unit = vectors**2 @ (1.0 / np.maximum(values, BLIND)) / scale**2
+    return float(covariance[slot, slot] / unit[np.searchsorted(seen, slot)])
 
 
 def along(refit: Refit, best: Minimum, slot: int, first: float, limit: float, bounds: tuple[float, float]) -> Profile:

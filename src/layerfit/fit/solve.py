@@ -95,8 +95,9 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     """Levenberg-Marquardt for a function that returns its loss and, as auxiliary output, gradient and J^T J.
 
     Optimistix's trust region and damped Newton descent, in coordinates scaled by the diagonal of J^T J (Marquardt 1963) so that the
-    units of the parameters do not matter. Bounds, `options["lower"]` and `options["upper"]`, always hold: a step is clipped
-    to them, and a parameter on its bound that the gradient pushes outwards sits out.
+    units of the parameters do not matter. Bounds, `options["lower"]` and `options["upper"]`, always hold: a parameter that would go far
+    beyond its own is stiffened by the distance to it (after Coleman and Li 1996), a step is clipped to them, and a parameter on its bound
+    that the gradient pushes outwards sits out.
     """
 
     rtol: float = 1e-5
@@ -132,7 +133,8 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
             jnp.where(accept, new, old) for new, old in ((loss, state.loss), (gradient, state.gradient), (gram, state.gram))
         )
         held = ((y <= lower) & (gradient > 0.0)) | ((y >= upper) & (gradient < 0.0))
-        step = lambda trust: self._descend(gradient, gram, held, trust)  # noqa: E731
+        room = jnp.where(gradient > 0.0, y - lower, upper - y)
+        step = lambda trust: self._descend(gradient, gram, held, room, trust)  # noqa: E731
         move = lambda trust: jnp.clip(y + step(trust), lower, upper) - y  # noqa: E731
         promise = lambda move: -(gradient @ move + 0.5 * move @ gram @ move)  # noqa: E731
         done = done | (promise(step(step_size)) <= self.gain * loss) | ~jnp.isfinite(loss)
@@ -150,14 +152,17 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
         operator = lx.MatrixLinearOperator(gram, lx.positive_semidefinite_tag)
         return optx.FunctionInfo.EvalGradHessian(loss, gradient, operator)
 
-    def _descend(self, gradient, gram, held, step_size):
-        """One damped step of the parameters that are not held, in scaled coordinates."""
+    def _descend(self, gradient, gram, held, room, step_size):
+        """One damped step of the parameters that are not held, in scaled coordinates; `room` is how far each may go before its bound."""
         diagonal = jnp.diagonal(gram)
-        # A parameter with no effect has no scale of its own; it stays where it is.
-        floor = 1e-14 * jnp.max(diagonal)
-        scale = jnp.where(held | (diagonal <= floor), 0.0, 1.0 / jnp.sqrt(jnp.maximum(diagonal, floor)))
-        scaled = gram * scale[:, None] * scale[None, :]
-        scaled = scaled + jnp.diag(jnp.where(scale > 0.0, 1e-12, 1.0))
+        still = held | (diagonal <= 0.0)  # a parameter with no effect has no scale of its own; it stays where it is
+        # A slope ever smaller, as below a coat that hides nearly all, asks for a step ever longer. So much is added to its curvature that
+        # it would be twice the room by itself, past the bound to be cut off there; the others then know of it. Elsewhere nothing is added.
+        needed = jnp.abs(gradient) / jnp.where(room > 0.0, 2.0 * room, 1.0)
+        bent = jnp.where(still, 0.0, jnp.maximum(needed - diagonal, 0.0))
+        scale = jnp.where(still, 0.0, 1.0 / jnp.sqrt(jnp.where(still, 1.0, diagonal + bent)))
+        scaled = (gram + jnp.diag(bent)) * scale[:, None] * scale[None, :]
+        scaled = scaled + jnp.diag(jnp.where(still, 1.0, 1e-12))
         info = self._info(jnp.zeros(()), gradient * scale, scaled)
         state = self.descent.query(gradient, info, self.descent.init(gradient, info))
         step, _ = self.descent.step(step_size, state)
