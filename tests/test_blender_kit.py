@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from commands import layerfit
-from layerfit.capture.scene import Constant, Directional, Point, SphereLight
+from layerfit.capture.scene import Constant, Directional, Point, Rectangle, SphereLight
 from layerfit.capture.scene_file import read_scene
 from layerfit.interchange import blender, formats
 from layerfit.interchange.mapping import alone
@@ -26,13 +26,21 @@ from layerfit.interchange.stage import draw, scene_views
 from layerfit.stack import Stack
 from layerfit.surfaces import Lambert
 
-CYCLES = 0.02
-"""Relative L2 between Cycles and the formula: its sphere has facets, its pixels a filter, and 64 samples are noise."""
+CYCLES = {"SUN": 0.02, "RECTANGLE": 0.04, "DISK": 0.04}
+"""Relative L2 between Cycles and the formula: its sphere has facets, its pixels a filter, and 64 samples are noise. Under an area both sides draw
+directions."""
 
 LAMPS: list[dict[str, Any]] = [
     {"type": "directional", "to_light": [0.0, 0.6, 0.8], "irradiance_rgb": [3.0, 2.0, 1.0]},
     {"type": "point", "position": [1.0, 2.0, 3.0], "intensity_rgb": [30.0, 30.0, 30.0]},
     {"type": "sphere", "center": [1.0, 2.0, 3.0], "radius": 0.5, "radiance_rgb": [9.0, 9.0, 9.0]},
+    {
+        "type": "rectangle",
+        "center": [1.0, 2.0, 3.0],
+        "half_u": [0.5, 0.0, 0.0],
+        "half_v": [0.0, 0.4, 0.0],
+        "radiance_rgb": [9.0, 9.0, 9.0],
+    },
     {"type": "constant", "radiance_rgb": [0.1, 0.1, 0.1]},
 ]
 
@@ -66,7 +74,7 @@ def test_what_it_writes_is_a_scene(kit, tmp_path):
     reference: Any = read_scene(path, Stack((), Lambert(), formats.read_start(_start(tmp_path)).form)).references[0]
     assert reference.exr == tmp_path / "ball.exr"
     assert reference.camera.vfov_deg == 25.0
-    assert [type(light) for light in reference.lights] == [Directional, Point, SphereLight, Constant]
+    assert [type(light) for light in reference.lights] == [Directional, Point, SphereLight, Rectangle, Constant]
     assert reference.lights[1].intensity_rgb == (30.0, 30.0, 30.0)
 
 
@@ -100,10 +108,40 @@ def test_a_soft_point_is_a_sphere_of_the_same_power(kit):
     np.testing.assert_allclose(flux, [200.0, 100.0, 50.0])
 
 
-@pytest.mark.parametrize("kind", ["AREA", "SPOT"])
-def test_a_lamp_that_a_scene_has_no_word_for_is_refused(kit, kind):
-    with pytest.raises(kit.Unsuited, match="suns, points and the world"):
-        kit.lamp(_lamp(type=kind))
+def test_a_lamp_that_a_scene_has_no_word_for_is_refused(kit):
+    with pytest.raises(kit.Unsuited, match="suns, points, areas and the world"):
+        kit.lamp(_lamp(type="SPOT"))
+
+
+def _area(shape: str, spread: float = math.pi, scale: float = 1.0) -> Any:
+    lamp = _lamp(type="AREA", shape=shape, size=2.0, size_y=3.0, spread=spread)
+    columns = [(0.0, scale, 0.0, 0.0), (0.0, 0.0, scale, 0.0), (scale, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0, 1.0)]
+    lamp.matrix_world = types.SimpleNamespace(translation=(1.0, 2.0, 3.0), col=columns, to_scale=lambda: (scale,) * 3)
+    return lamp
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind", "area"),
+    [
+        ("SQUARE", "rectangle", 4.0),
+        ("RECTANGLE", "rectangle", 6.0),
+        ("DISK", "disk", math.pi),
+        ("ELLIPSE", "disk", 1.5 * math.pi),
+    ],
+)
+def test_an_area_is_a_patch_of_the_same_power(kit, shape, kind, area):
+    words = kit.lamp(_area(shape))
+    assert words["type"] == kind
+    across = np.cross(words["half_u"], words["half_v"])
+    np.testing.assert_allclose(across / np.linalg.norm(across), [-1.0, 0.0, 0.0], err_msg="it shines along -Z of the lamp")
+    np.testing.assert_allclose(np.linalg.norm(across) * (4.0 if kind == "rectangle" else math.pi), area)
+    np.testing.assert_allclose(np.array(words["radiance_rgb"]) * math.pi * area, [100.0, 50.0, 25.0])
+
+
+@pytest.mark.parametrize("odd", [{"spread": 1.0}, {"scale": 2.0}])
+def test_an_area_that_is_more_than_a_patch_is_refused(kit, odd):
+    with pytest.raises(kit.Unsuited, match=r"scaled, or of a spread"):
+        kit.lamp(_area("SQUARE", **odd))
 
 
 def _emission(strength: float = 4.0, linked: bool = False) -> Any:
@@ -172,9 +210,13 @@ ball = bpy.context.object
 bpy.ops.object.shade_smooth()
 exec(open(sys.argv[2]).read())
 bpy.ops.object.select_all(action="DESELECT")
-sun = bpy.data.lights.new("sun", "SUN")
-sun.energy, sun.angle = 3.0, 0.1
-lamp = bpy.data.objects.new("sun", sun)
+light = bpy.data.lights.new("lamp", "SUN" if sys.argv[3] == "SUN" else "AREA")
+if light.type == "SUN":
+    light.energy, light.angle = 3.0, 0.1
+else:
+    light.energy, light.shape, light.size, light.size_y = 300.0, sys.argv[3], 2.0, 1.2
+lamp = bpy.data.objects.new("lamp", light)
+lamp.location = (2, -3, 2.4)
 lamp.rotation_euler = Vector((2, -3, 2.4)).to_track_quat("Z", "Y").to_euler()
 eye = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))
 eye.data.lens, eye.location = 85, (0.8, -4.9, 0.6)
@@ -185,10 +227,11 @@ scene.camera = eye
 scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 72, 64, 100
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
 """
-"""A scene as a user has it: a ball that the exported script gives its material, something beside it, a sun and a camera."""
+"""A scene as a user has it: a ball that the exported script gives its material, something beside it, a lamp and a camera."""
 
 
-def test_cycles_draws_the_formula_that_is_fitted(tmp_path):
+@pytest.mark.parametrize("lamp", ["SUN", "RECTANGLE", "DISK"])
+def test_cycles_draws_the_formula_that_is_fitted(tmp_path, lamp):
     """All the way round: a material is exported, Blender builds it, the kit renders it, and the picture is that of the formula."""
     python = os.environ.get("LAYERFIT_BPY")
     if not python:
@@ -202,7 +245,7 @@ def test_cycles_draws_the_formula_that_is_fitted(tmp_path):
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     run = lambda *words: subprocess.run([python, *map(str, words)], cwd=tmp_path, check=True, capture_output=True)  # noqa: E731
-    run("make.py", tmp_path / "user.blend", "paint.py")
+    run("make.py", tmp_path / "user.blend", "paint.py", lamp)
     run("kit.py", "--blend", "user.blend", "--object", "Sphere", "--output", tmp_path, "--samples", "64")
     start = formats.read_start(tmp_path / "Sphere.principled.json")
     assert float(start.layers[0].eta) == pytest.approx(1.6)
@@ -210,7 +253,8 @@ def test_cycles_draws_the_formula_that_is_fitted(tmp_path):
     (view,) = scene_views(tmp_path / "Sphere.toml")
     values = draw(view, alone(read))
     assert len(view.target) > 1000
-    assert np.sqrt(np.sum((values - view.target) ** 2) / np.sum(view.target**2)) < CYCLES
+    assert np.sqrt(np.sum((values - view.target) ** 2) / np.sum(view.target**2)) < CYCLES[lamp]
+    assert values.sum() == pytest.approx(view.target.sum(), rel=0.01)
 
 
 def _script(made: Any) -> str:

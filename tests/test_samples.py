@@ -8,7 +8,18 @@ from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import camera_rays, frames, sphere_surface, sphere_tangent
 from layerfit.capture.lights import HALF_VECTOR_WIDTHS, _half_vector_pdf, receive
 from layerfit.capture.samples import load_reference
-from layerfit.capture.scene import Camera, Constant, Directional, EnvironmentMap, Point, Reference, Sphere, SphereLight
+from layerfit.capture.scene import (
+    Camera,
+    Constant,
+    Directional,
+    Disk,
+    EnvironmentMap,
+    Point,
+    Rectangle,
+    Reference,
+    Sphere,
+    SphereLight,
+)
 from layerfit.errors import InputError
 
 CAMERA = Camera((0.8, 0.6, 4.9), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0)
@@ -140,6 +151,40 @@ def test_a_small_sphere_is_a_point():
 def test_a_sphere_that_holds_the_surface_is_refused():
     with pytest.raises(InputError, match="holds part of the surface"):
         received(SphereLight((0.0, 0.0, 1.0), 2.0, (1.0, 1.0, 1.0)))
+
+
+def _from_polygon(corners, normal):
+    """Irradiance from a polygon of radiance 1, all of it above the horizon (Lambert 1760)."""
+    corners = corners / np.linalg.norm(corners, axis=-1, keepdims=True)
+    total = 0.0
+    for a, b in zip(corners, np.roll(corners, -1, 0), strict=True):
+        edge = np.cross(a, b)
+        total += np.arccos(a @ b) * (edge @ normal) / np.linalg.norm(edge)
+    return abs(total) / 2.0
+
+
+@pytest.mark.parametrize("center", [(0.3, -0.2, 1.5), (0.0, 0.0, 4.0)])
+def test_a_rectangle_gives_what_its_corners_say(center):
+    center, u, v = np.array(center), np.array([0.5, 0.1, 0.1]), np.array([0.0, -0.8, 0.2])
+    normal, light = received(Rectangle(tuple(center), tuple(u), tuple(v), (1.0, 1.0, 1.0)))
+    corners = np.array([center + a * u + b * v for a, b in [(1, 1), (1, -1), (-1, -1), (-1, 1)]])
+    wanted = [_from_polygon(corners, n) for n in normal]
+    ratio = light.weight[..., 0].sum(1) / wanted
+    np.testing.assert_allclose(ratio, 1.0, atol=0.05)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=2e-3)
+
+
+def test_a_disk_overhead_is_a_cone():
+    normal, light = received(Disk((0.0, 0.0, 2.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (1.0, 1.0, 1.0)))
+    ratio = light.weight[..., 0].sum(1) / (np.pi / 5.0 * normal[:, 2])
+    np.testing.assert_allclose(ratio, 1.0, atol=0.05)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=3e-3)
+
+
+@pytest.mark.parametrize("kind", [Rectangle, Disk])
+def test_a_flat_light_shines_to_one_side(kind):
+    away = kind((0.0, 0.0, 2.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1.0))
+    assert not received(away)[1].weight.any()
 
 
 def test_an_environment_map_is_where_its_pixels_say(tmp_path):

@@ -117,6 +117,11 @@ def test_an_environment_map_is_named_from_the_scene(scene, tmp_path):
         ('type = "directional"', 'type = "direction"', "did you mean 'directional'"),
         ("to_light = [0, 3, 4]", "to_light = [0, 0, 0]", "a direction is not zero"),
         ("to_light = [0, 3, 4]", "", "needs to_light"),
+        (
+            'type = "directional"\nto_light = [0, 3, 4]\nirradiance_rgb = [3, 2, 1]',
+            'type = "disk"\ncenter = [0, 3, 4]\nhalf_u = [1, 0, 1]\nhalf_v = [-2, 0, -2]\nradiance_rgb = 1',
+            "half_u and half_v lie along one line",
+        ),
         ("irradiance_rgb = [3, 2, 1]", "irradiance_rgb = [3, -2, 1]", "light is not negative"),
         ("irradiance_rgb = [3, 2, 1]", "irradiance_rgb = [3, nan, 1]", "finite"),
         ('model = "corrected"', 'model = "correct"', "did you mean 'corrected'"),

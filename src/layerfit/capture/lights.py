@@ -1,8 +1,8 @@
 """Lights as directions and weights: what each pixel receives, per unit of BRDF.
 
 A pixel is the sum over samples of f(wi, wo) times weight. Directional and point lights are one sample each, exact. Constant,
-spherical and environment light is a quadrature: directions drawn for each pixel from a mixture of a cosine lobe, half vectors of
-three widths and (spheres, maps) the light itself, weighted by the balance heuristic (Veach and Guibas 1995).
+spherical, flat and environment light is a quadrature: directions drawn for each pixel from a mixture of a cosine lobe, half vectors of
+three widths and (all but the constant one) the light itself, weighted by the balance heuristic (Veach and Guibas 1995).
 """
 
 import dataclasses
@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from .exr import read_exr
 from .geometry import frames
-from .scene import Constant, Directional, EnvironmentMap, Light, Point, SphereLight
+from .scene import Constant, Directional, Disk, EnvironmentMap, FlatLight, Light, Point, SphereLight
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
@@ -87,7 +87,7 @@ def _exact(light: Directional | Point, position: np.ndarray, normal: np.ndarray)
 
 
 def _quadrature(
-    light: Constant | SphereLight | EnvironmentMap,
+    light: Constant | SphereLight | FlatLight | EnvironmentMap,
     position: np.ndarray,
     normal: np.ndarray,
     view: np.ndarray,
@@ -96,25 +96,30 @@ def _quadrature(
     widths: tuple[float, ...],
 ) -> tuple[np.ndarray, np.ndarray]:
     n = len(position)
-    strategies = 1 + len(widths) + (not isinstance(light, Constant))
-    each = max(1, samples // strategies)
+    own: _SphereSampler | _FlatSampler | _MapSampler | None = None
+    if isinstance(light, SphereLight):
+        own = _SphereSampler(light, position)
+    elif isinstance(light, FlatLight):
+        own = _FlatSampler(light, position)
+    elif isinstance(light, EnvironmentMap):
+        own = _map_sampler(light)
+    # Directions to a lamp are spread over it: to what scatters everywhere they are as good as a cosine lobe.
+    wide = not isinstance(light, (SphereLight, FlatLight))
+    each = max(1, samples // (wide + len(widths) + (own is not None)))
     to_surface = frames(normal, None)
     wo = np.einsum("nij,nj->ni", to_surface, view)
-    drawn = [_cosine_lobe(_points(n, each, rng))]
+    drawn = [_cosine_lobe(_points(n, each, rng))] if wide else []
     for alpha in widths:
         h = _ggx_normals(_points(n, each, rng), alpha)
         drawn.append(2.0 * np.sum(h * wo[:, None], -1, keepdims=True) * h - wo[:, None])
     directions = [w @ to_surface for w in drawn]
-    own = None
-    if isinstance(light, SphereLight):
-        own = _SphereSampler(light, position)
-    elif isinstance(light, EnvironmentMap):
-        own = _map_sampler(light)
     if own:
         directions.append(own.draw(_points(n, each, rng)))
     to_light = np.concatenate(directions, 1)
     wi = to_light @ to_surface.swapaxes(1, 2)
-    mixture = _cosine_pdf(wi) + _half_vector_pdf(wi, wo, widths)
+    mixture = _half_vector_pdf(wi, wo, widths)
+    if wide:
+        mixture = mixture + _cosine_pdf(wi)
     if own:
         mixture = mixture + own.pdf(to_light)
     cosine = wi[..., 2]
@@ -160,12 +165,16 @@ def _half_vector_pdf(wi: np.ndarray, wo: np.ndarray, widths: tuple[float, ...]) 
     return np.where(there, lobes / (4.0 * np.pi * np.maximum(c, 1e-9) * np.where(there, z, 1.0) ** 3), 0.0)
 
 
-def _radiance(light: Constant | SphereLight | EnvironmentMap, position: np.ndarray, to_light: np.ndarray) -> np.ndarray:
+def _radiance(
+    light: Constant | SphereLight | FlatLight | EnvironmentMap, position: np.ndarray, to_light: np.ndarray
+) -> np.ndarray:
     if isinstance(light, Constant):
         return np.broadcast_to(light.radiance_rgb, to_light.shape)
     if isinstance(light, SphereLight):
         sampler = _SphereSampler(light, position)
         return sampler.inside(to_light)[..., None] * np.asarray(light.radiance_rgb)
+    if isinstance(light, FlatLight):
+        return (_FlatSampler(light, position).pdf(to_light) > 0.0)[..., None] * np.asarray(light.radiance_rgb)
     return _map_sampler(light).radiance(to_light)
 
 
@@ -191,6 +200,37 @@ class _SphereSampler:
 
     def pdf(self, to_light: np.ndarray) -> np.ndarray:
         return self.inside(to_light) / (2.0 * np.pi * self.rise[:, None])
+
+
+class _FlatSampler:
+    """Directions to a rectangle or a disk, uniform in its area."""
+
+    def __init__(self, light: FlatLight, position: np.ndarray):
+        self.round = isinstance(light, Disk)
+        self.away = np.subtract(light.center, position)
+        self.halves = np.array([light.half_u, light.half_v])
+        across = np.cross(light.half_u, light.half_v)
+        self.normal = across / np.linalg.norm(across)
+        self.area = (np.pi if self.round else 4.0) * np.linalg.norm(across)
+        self.within = np.linalg.pinv(self.halves)  # (3, 2): a point of its plane, in half widths
+
+    def draw(self, u: np.ndarray) -> np.ndarray:
+        if self.round:
+            r, phi = np.sqrt(u[..., 0]), 2.0 * np.pi * u[..., 1]
+            place = np.stack([r * np.cos(phi), r * np.sin(phi)], -1)
+        else:
+            place = 2.0 * u - 1.0
+        away = self.away[:, None] + place @ self.halves
+        return away / np.linalg.norm(away, axis=-1, keepdims=True)
+
+    def pdf(self, to_light: np.ndarray) -> np.ndarray:
+        """Density over solid angle; 0 where a direction misses the light, or comes to its back."""
+        facing = -(to_light @ self.normal)
+        distance = -(self.away @ self.normal)[:, None] / np.where(facing > 0.0, facing, 1.0)
+        place = (distance[..., None] * to_light - self.away[:, None]) @ self.within
+        inside = np.sum(place**2, -1) <= 1.0 if self.round else np.max(np.abs(place), -1) <= 1.0
+        there = inside & (facing > 0.0) & (distance > 0.0)
+        return np.where(there, distance**2 / (self.area * np.where(there, facing, 1.0)), 0.0)
 
 
 class _MapSampler:

@@ -67,6 +67,26 @@ class SphereLight:
 
 
 @dataclasses.dataclass(frozen=True)
+class FlatLight:
+    """A flat patch of constant radiance that shines to one side: that of `half_u` x `half_v`, the vectors from its centre to the middles of
+    two neighbouring sides."""
+
+    center: Vector
+    half_u: Vector
+    half_v: Vector
+    radiance_rgb: Vector
+    name: str = ""
+
+
+class Rectangle(FlatLight):
+    """All of the patch; a parallelogram, where its sides are not square to each other."""
+
+
+class Disk(FlatLight):
+    """The ellipse that touches the patch's four sides in their middles."""
+
+
+@dataclasses.dataclass(frozen=True)
 class EnvironmentMap:
     """A lat-long image at infinity, Y up: u = atan2(d.x, -d.z) / 2 pi mod 1, v = acos(d.y) / pi, row 0 up.
 
@@ -81,13 +101,15 @@ class EnvironmentMap:
     name: str = ""
 
 
-Light = Directional | Point | Constant | SphereLight | EnvironmentMap
+Light = Directional | Point | Constant | SphereLight | Rectangle | Disk | EnvironmentMap
 
 BRIGHTNESS = {
     Directional: "irradiance_rgb",
     Point: "intensity_rgb",
     Constant: "radiance_rgb",
     SphereLight: "radiance_rgb",
+    Rectangle: "radiance_rgb",
+    Disk: "radiance_rgb",
     EnvironmentMap: "scale",
 }
 """What says how bright a light is."""

@@ -22,11 +22,13 @@ from .scene import (
     Camera,
     Constant,
     Directional,
+    Disk,
     EnvironmentMap,
     FitRequest,
     Light,
     MeasuredReference,
     Point,
+    Rectangle,
     Reference,
     Scene,
     Sphere,
@@ -196,6 +198,8 @@ def _light(table: Any, path: Path, where: str) -> Light:
     values.pop("layout", None)
     if "file" in values:
         values["file"] = path.parent / values["file"]
+    if readers is _FLAT and not np.any(np.cross(values["half_u"], values["half_v"])):
+        raise InputError(f"{where}: half_u and half_v lie along one line, or one of them is 0; the light has no area")
     return cls(**values)
 
 
@@ -207,11 +211,15 @@ def _light_name(value: Any, where: str) -> str:
     return value
 
 
+_FLAT = {"center": vector, "half_u": vector, "half_v": vector, "radiance_rgb": rgb}
+
 LIGHTS: dict[str, tuple[type, dict[str, Callable[[Any, str], Any]]]] = {
     "directional": (Directional, {"to_light": direction, "irradiance_rgb": rgb}),
     "point": (Point, {"position": vector, "intensity_rgb": rgb}),
     "constant": (Constant, {"radiance_rgb": rgb}),
     "sphere": (SphereLight, {"center": vector, "radius": positive, "radiance_rgb": rgb}),
+    "rectangle": (Rectangle, _FLAT),
+    "disk": (Disk, _FLAT),
     "envmap": (
         EnvironmentMap,
         {"file": text, "scale": rgb, "up": one_of("y", "z"), "rows": one_of("centre", "on poles"), "layout": layout},

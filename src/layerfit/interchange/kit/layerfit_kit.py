@@ -144,7 +144,7 @@ def rendered(layer):
 
 
 def lamp(thing):
-    """Blender's strengths are W/m^2 of a sun and W of a point, whose radiance is W / (4 pi^2 r^2)."""
+    """Blender's strengths are W/m^2 of a sun and W of the others. Of a point the radiance is W / (4 pi^2 r^2), of an area W / (pi area)."""
     light, place = thing.data, thing.matrix_world
     bright = light.energy * 2.0 ** getattr(light, "exposure", 0.0)
     tint = light.temperature_color if getattr(light, "use_temperature", False) else (1.0, 1.0, 1.0)
@@ -162,9 +162,11 @@ def lamp(thing):
             "to_light": list(place.to_quaternion() @ type(place.translation)((0.0, 0.0, 1.0))),
             "irradiance_rgb": rgb,
         }
+    if light.type == "AREA":
+        return area(thing, rgb)
     if light.type != "POINT":
         raise Unsuited(
-            f"{thing.name} is a lamp of type {light.type}: layerfit knows suns, points and the world. Change it, or hide it from renders"
+            f"{thing.name} is a lamp of type {light.type}: layerfit knows suns, points, areas and the world. Change it, or hide it from renders"
         )
     centre, radius = list(place.translation), light.shadow_soft_size
     if radius <= POINT:
@@ -172,6 +174,25 @@ def lamp(thing):
     light.use_soft_falloff = False
     radiance = [v / (4.0 * math.pi**2 * radius**2) for v in rgb]
     return {"type": "sphere", "center": centre, "radius": radius, "radiance_rgb": radiance}
+
+
+def area(thing, rgb):
+    """It shines along its -Z."""
+    light, place = thing.data, thing.matrix_world
+    if light.spread < math.pi - 1e-3 or any(abs(s - 1.0) > 1e-4 for s in place.to_scale()):
+        raise Unsuited(
+            f"{thing.name} is an area lamp that is scaled, or of a spread below 180 degrees. Apply its scale, and give it 180"
+        )
+    shape = {"SQUARE": "rectangle", "RECTANGLE": "rectangle", "DISK": "disk", "ELLIPSE": "disk"}[light.shape]
+    sides = light.size, light.size if light.shape in ("SQUARE", "DISK") else light.size_y
+    size = sides[0] * sides[1] * (math.pi / 4.0 if shape == "disk" else 1.0)
+    return {
+        "type": shape,
+        "center": list(place.translation),
+        "half_u": [0.5 * sides[0] * v for v in place.col[0][:3]],
+        "half_v": [-0.5 * sides[1] * v for v in place.col[1][:3]],
+        "radiance_rgb": [v / (math.pi * size) for v in rgb],
+    }
 
 
 def world(scene):
