@@ -137,6 +137,19 @@ def test_what_an_earlier_result_did_not_leave_stays(earlier, left, tmp_path):
     assert (tmp_path / "planes.png").exists() == left
 
 
+def test_of_numbered_files_of_an_earlier_result_none_is_left(tmp_path):
+    for name in ("preset_2.json", "preset_3.json", "notes_2.txt", "other.txt"):
+        (tmp_path / name).write_text("earlier")
+    names = ["preset.json", "preset_2.json", "preset_3.json", "notes_2.txt", "other.txt", "../preset_2.json", 3]
+    (tmp_path / "fit.json").write_text(json.dumps({"schema": "layerfit/fit", "files": names}))
+    contents = {"preset.json": "new", "preset_2.json": "new", "fit.json": "new"}
+    write_files(tmp_path, of_ours(tmp_path, contents, "fit.json", "layerfit/fit"))
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == contents | {
+        "notes_2.txt": "earlier",
+        "other.txt": "earlier",
+    }
+
+
 NAMES = [f"{k}.json" for k in range(5)]
 
 OFTEN = """

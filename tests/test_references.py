@@ -21,6 +21,7 @@ from layerfit.fit.residuals import scaled
 from layerfit.fit.result import parameters, to_json
 from layerfit.job import fit_scene
 from layerfit.layers import Coat
+from layerfit.preset import read_preset
 from layerfit.render import predict
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Lambert
@@ -270,6 +271,11 @@ def test_a_scene_of_two_colours_under_ambient_light_is_fitted_and_shown(see, tmp
     report = (tmp_path / "out" / "report.html").read_text()
     assert "light.ambient.grey" in report
     assert "base.albedo@1" in report
+    assert outcome.document["presets"] == ["preset.json", "preset_2.json"]
+    for preset, albedo in zip(outcome.document["presets"], ([0.5, 0.28, 0.13], [0.2, 0.4, 0.6]), strict=True):
+        np.testing.assert_allclose(read_preset(tmp_path / "out" / preset).base.albedo, albedo, rtol=0.02)
+    assert (tmp_path / "out" / "material.frag").read_text() != (tmp_path / "out" / "material_2.frag").read_text()
+    assert set(outcome.written) == {path.name for path in (tmp_path / "out").iterdir()}
 
 
 @pytest.mark.parametrize(

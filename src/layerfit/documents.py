@@ -7,6 +7,7 @@ import fcntl
 import json
 import math
 import os
+import re
 import signal
 import sys
 import tempfile
@@ -179,12 +180,14 @@ def of_ours(
     directory: Path, contents: Mapping[str, str | bytes | None], document: str, schema: str
 ) -> dict[str, str | bytes | None]:
     """The files of a result without those that it does not have, but where the document of an earlier one stands: what is named alike
-    elsewhere is the user's, and stays."""
+    elsewhere is the user's, and stays. Of the `files` of that document those that are numbered go too, such as preset_3.json beside a preset.json."""
     try:
-        earlier = json.loads((directory / document).read_text(encoding="utf-8")).get("schema") == schema
+        earlier = json.loads((directory / document).read_text(encoding="utf-8"))
+        ours, files = earlier.get("schema") == schema, earlier.get("files", [])
     except (OSError, ValueError, AttributeError, RecursionError):
-        earlier = False
-    return {name: content for name, content in contents.items() if earlier or content is not None}
+        ours, files = False, []
+    gone = {name: None for name in files if isinstance(name, str) and re.sub(r"_\d+\.", ".", name) in contents} if ours else {}
+    return gone | {name: content for name, content in contents.items() if ours or content is not None}
 
 
 @contextlib.contextmanager

@@ -117,17 +117,20 @@ def fit_scene(
     document["quadrature"] = sampling
     in_planes = _planes(result, name)
     trace = [(row.time_s, row.stage, row.start, row.error) for row in result.trace]
+    materials = {"": result.stack} | {f"_{k}": stack for k, stack in _others(result)}
+    document["presets"] = [f"preset{which}.json" for which in materials]
+    shaders = {which: shader if which == "" else print_material(stack, name + which) for which, stack in materials.items()}
     files = {
-        "material.frag": shader.text() if parity.passed or force else None,
+        **{f"material{which}.frag": s.text() if parity.passed or force else None for which, s in shaders.items()},
         "trace.csv": _trace(result),
         "fit.png": picture,
         "planes.png": in_planes,
-        "preset.json": json.dumps(preset_of(result.stack, name, fit=_summary(document)), indent=2) + "\n",
+        **{f"preset{which}.json": _preset(stack, name + which, document) for which, stack in materials.items()},
         "report.html": html.page(name, document, pairs, picture, trace, shader.text(), live, in_planes),
-        "fit.json": json.dumps(document, indent=2, allow_nan=False) + "\n",
     }
+    written = document["files"] = [*(name for name, content in files.items() if content is not None), "fit.json"]
+    files["fit.json"] = json.dumps(document, indent=2, allow_nan=False) + "\n"
     write_files(directory, of_ours(directory, files, "fit.json", document["schema"]))
-    written = [name for name, content in files.items() if content is not None]
     return Outcome(document, directory, result.converged and parity.passed, written)
 
 
@@ -153,6 +156,17 @@ def fit_views(views: Sequence[AnyView], scene: Scene, **options: Any) -> FitResu
         where=f"{scene.path}: fit",
         **options,
     )
+
+
+def _others(result: FitResult) -> list[tuple[int, Stack]]:
+    """The material in the second reference and those after it, counted from 1, where references have some of it for themselves."""
+    if not any(f.reference is not None and f.layer is not None for f in result.free.free):
+        return []
+    return list(enumerate(result.materials, 1))[1:]
+
+
+def _preset(stack: Stack, name: str, document: dict[str, Any]) -> str:
+    return json.dumps(preset_of(stack, name, fit=_summary(document)), indent=2) + "\n"
 
 
 def _planes(result: FitResult, name: str) -> bytes | None:
