@@ -19,43 +19,13 @@ from typing import Any
 import jax
 import numpy as np
 from fit_speed import Scipy
+from renders import lacquer_scene
 from rich.console import Console
 
 from layerfit import fit_batch, load, predict, read_scene, use_compilation_cache
 from layerfit.capture.exr import write_exr
 from layerfit.fit.parameters import with_fixed
 from layerfit.fit.weights import inverse_sigma
-
-SCENE = """\
-[reference]
-exr = "reference.exr"
-[geometry]
-kind = "sphere"
-[camera]
-position = [0.8, 0.6, 4.9]
-look_at = [0, 0, 0]
-vfov_deg = 26
-[[light]]
-type = "directional"
-to_light = [2, 2.4, 3]
-irradiance_rgb = 3
-[material]
-model = "{form}"
-[[material.layers]]
-type = "coat"
-alpha = 0.3
-eta = 1.4
-tau = [0.3, 0.3, 0.3]
-masking = "smith_separable"
-[material.base]
-type = "conductor"
-alpha = 0.4
-eta = [0.201, 0.924, 1.102]
-k = [3.913, 2.453, 2.142]
-masking = "smith_separable"
-[fit]
-free = ["coat.alpha", "coat.eta", "coat.tau", "base.alpha"]
-"""
 
 
 def make(folder: Path, count: int, side: int, form: str) -> list[dict[str, Any]]:
@@ -65,10 +35,8 @@ def make(folder: Path, count: int, side: int, form: str) -> list[dict[str, Any]]
     for k in range(count):
         place = folder / f"{k:05d}"
         place.mkdir()
-        path = place / "scene.toml"
-        path.write_text(SCENE.format(form=form))
+        path = lacquer_scene(place, side, form)
         if k == 0:  # where the pixels lie is the same for all
-            write_exr(place / "reference.exr", {channel: np.ones((side, side)) for channel in "RGB"})
             view = load(scene := read_scene(path))[0]
             samples = view.samples()
         truths.append(

@@ -57,8 +57,9 @@ for thing in (lamp, eye):
 scene.camera = eye
 scene.render.resolution_x = scene.render.resolution_y = 128
 scene.render.resolution_percentage = 100
-bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
 """
+"""For Blender's Python: a sphere of the material that the script `sys.argv[2]` makes, a sun and a camera."""
+SAVE = "bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])\n"
 
 
 def row(name: str) -> str:
@@ -81,7 +82,11 @@ def in_cycles(name: str, python: str, picture: Path | None) -> str:
     found = convert(stack, name, "blender")
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        for file, text in {"stage.py": STAGE, "paint.py": FORMATS["blender"].write(found), "kit.py": blender_kit()}.items():
+        for file, text in {
+            "stage.py": STAGE + SAVE,
+            "paint.py": FORMATS["blender"].write(found),
+            "kit.py": blender_kit(),
+        }.items():
             (folder / file).write_text(text)
         for words in (
             ("stage.py", str(folder / "user.blend"), "paint.py"),

@@ -20,52 +20,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from renders import lacquer_scene
 from rich.console import Console
 from rich.table import Table
-
-from layerfit.capture.exr import write_exr
 
 FLOOR = "import jax, scipy.optimize; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
 FIT = "layerfit fit, first on this machine"
 AGAIN = "layerfit fit, again"
 PEER = "import jax and scipy.optimize, compile x + 1"
-SCENE = """\
-[reference]
-exr = "reference.exr"
-[geometry]
-kind = "sphere"
-[camera]
-position = [0.8, 0.6, 4.9]
-look_at = [0, 0, 0]
-vfov_deg = 26
-[[light]]
-type = "directional"
-to_light = [2, 2.4, 3]
-irradiance_rgb = 3
-[material]
-model = "MODEL"
-[[material.layers]]
-type = "coat"
-alpha = 0.3
-eta = 1.4
-tau = [0.3, 0.3, 0.3]
-[material.base]
-type = "conductor"
-alpha = 0.4
-eta = [0.201, 0.924, 1.102]
-k = [3.913, 2.453, 2.142]
-[fit]
-free = ["coat.alpha", "coat.eta", "coat.tau", "base.alpha"]
-"""
 
 
 def reference(folder: Path, side: int, model: str) -> Path:
     """A scene of `side` x `side` pixels whose reference layerfit renders from a shipped preset."""
-    scene, image = folder / "scene.toml", folder / "reference.exr"
-    scene.write_text(SCENE.replace("MODEL", model))
-    write_exr(image, dict.fromkeys("RGB", np.ones((side, side))))
+    scene = lacquer_scene(folder, side, model)
     subprocess.run(
-        [sys.executable, "-m", "layerfit", "render", "lacquered_copper", scene, "-o", image],
+        [sys.executable, "-m", "layerfit", "render", "lacquered_copper", scene, "-o", folder / "reference.exr"],
         check=True,
         stdout=subprocess.DEVNULL,
     )

@@ -12,8 +12,23 @@ from typing import Any
 
 import numpy as np
 
+from layerfit.capture.exr import write_exr
 from layerfit.capture.scene import Scene
 from layerfit.capture.scene_file import read_scene
+
+LACQUER = Path(__file__).parents[1] / "examples" / "references" / "lacquered_copper.toml"
+"""Six parameters of a coat over copper, from a poor start."""
+
+
+def lacquer_scene(folder: Path, side: int, model: str) -> Path:
+    """The scene `LACQUER` in a folder, of an analytic sphere on `side` x `side` pixels; its reference is blank until one is rendered."""
+    image = folder / "reference.exr"
+    write_exr(image, dict.fromkeys("RGB", np.ones((side, side))))
+    text = LACQUER.read_text(encoding="utf-8").replace("lacquered_copper.exr", image.name)
+    text = text.replace("[material]\n", f'[geometry]\nkind = "sphere"\n\n[material]\nmodel = "{model}"\n')
+    scene = folder / "scene.toml"
+    scene.write_text(text, encoding="utf-8")
+    return scene
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from interchange import SAVE, STAGE
 
 from commands import layerfit
 from layerfit.capture.scene import Constant, Directional, Point, Rectangle, SphereLight
@@ -199,35 +200,20 @@ def test_the_exposure_of_a_film_is_one(kit):
     assert cycles.film_exposure == 1.0
 
 
-MAKE = """
-import bpy, sys
-from mathutils import Vector
-bpy.ops.wm.read_factory_settings(use_empty=True)
-scene = bpy.context.scene
+OTHERWISE = """
 bpy.ops.mesh.primitive_cube_add(location=(4, 0, 0))
-bpy.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=128)
-ball = bpy.context.object
-bpy.ops.object.shade_smooth()
-exec(open(sys.argv[2]).read())
 bpy.ops.object.select_all(action="DESELECT")
-light = bpy.data.lights.new("lamp", "SUN" if sys.argv[3] == "SUN" else "AREA")
-if light.type == "SUN":
-    light.energy, light.angle = 3.0, 0.1
+if sys.argv[3] == "SUN":
+    sun.energy, sun.angle = 3.0, 0.1
 else:
-    light.energy, light.shape, light.size, light.size_y = 300.0, sys.argv[3], 2.0, 1.2
-lamp = bpy.data.objects.new("lamp", light)
+    lamp.data = area = bpy.data.lights.new("area", "AREA")
+    area.energy, area.shape, area.size, area.size_y = 300.0, sys.argv[3], 2.0, 1.2
 lamp.location = (2, -3, 2.4)
-lamp.rotation_euler = Vector((2, -3, 2.4)).to_track_quat("Z", "Y").to_euler()
-eye = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))
 eye.data.lens, eye.location = 85, (0.8, -4.9, 0.6)
 eye.rotation_euler = Vector(eye.location).to_track_quat("Z", "Y").to_euler()
-for thing in (lamp, eye):
-    scene.collection.objects.link(thing)
-scene.camera = eye
-scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 72, 64, 100
-bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
+scene.render.resolution_x, scene.render.resolution_y = 72, 64
 """
-"""A scene as a user has it: a ball that the exported script gives its material, something beside it, a lamp and a camera."""
+"""A scene as a user has it: something beside the sphere, another lamp, a camera that looks from aside at a picture that is no square."""
 
 
 @pytest.mark.parametrize("lamp", ["SUN", "RECTANGLE", "DISK"])
@@ -241,7 +227,7 @@ def test_cycles_draws_the_formula_that_is_fitted(tmp_path, lamp):
         | {"Base Color": [0.9, 0.5, 0.4], "Metallic": 1.0, "Roughness": 0.45, "Specular Tint": [0.9, 0.8, 1.0]}
         | {"Coat Weight": 1.0, "Coat Roughness": 0.3, "Coat IOR": 1.6, "Coat Tint": [0.8, 0.6, 0.3]}
     )
-    files = {"make.py": MAKE, "paint.py": _script(made), "kit.py": formats.blender_kit()}
+    files = {"make.py": STAGE + OTHERWISE + SAVE, "paint.py": _script(made), "kit.py": formats.blender_kit()}
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     run = lambda *words: subprocess.run([python, *map(str, words)], cwd=tmp_path, check=True, capture_output=True)  # noqa: E731

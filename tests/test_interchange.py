@@ -379,9 +379,9 @@ BAD = {
         "<materialx><open_pbr_surface name='a'><input name='base_color' nodename='b'/></open_pbr_surface></materialx>",
         "comes from a graph or a texture",
     ),
-    "three.mtlx": (_surface("base_metalness", "0, 0, 0"), "base_metalness = .*: should be a number"),
+    "three.mtlx": (_surface("base_metalness", "0, 0, 0"), "base_metalness = .*: should be a finite number"),
     "one.mtlx": (_surface("coat_color", "0.5"), "coat_color = 0.5: should be three numbers"),
-    "word.mtlx": (_surface("coat_ior", "glass"), "coat_ior = 'glass': should be a number"),
+    "word.mtlx": (_surface("coat_ior", "glass"), "coat_ior = 'glass': should be a finite number"),
     "digits.gltf": (
         '{"materials": [{"pbrMetallicRoughness": {"metallicFactor": %s}}]}' % ("9" * 400),
         "metallicFactor = .*: should be a finite number",

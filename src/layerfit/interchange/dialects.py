@@ -10,18 +10,18 @@ class Dialect:
 
     title: str
     """Name and version of the formula, for people."""
-    exact: bool
+    exact: bool = False
     """Whether dielectrics reflect by Fresnel's equations; else by Schlick's formula."""
-    coat_index: bool
+    coat_index: bool = False
     """Whether the coat has an index of its own; else it is `COAT_INDEX`."""
-    coat_masking: Literal["smith", "kelemen"]
-    passes: Literal["view", "half", "albedo"]
+    coat_masking: Literal["smith", "kelemen"] = "smith"
+    passes: Literal["view", "half", "albedo"] = "view"
     """The rest that reaches the base: 1 - F of the angle of view, 1 - F of the half angle, or 1 - the lobe's own albedo."""
-    path: Literal["both", "view", "flat"] | None
+    path: Literal["both", "view", "flat"] | None = None
     """Way through the absorbing coat: of both directions refracted, twice that of the viewer, twice its thickness; None where it cannot absorb."""
-    edge_tint: bool
+    edge_tint: bool = False
     """Whether a metal has a reflectance of its own at 82 degrees (Hoffman 2019)."""
-    layered: bool
+    layered: bool = False
     """Whether a base's dielectric lobe takes from its diffuse part."""
     compensates: bool = False
     """Whether lobes are scaled for light that goes to and fro between facets (Turquin 2019)."""
@@ -42,7 +42,6 @@ DIALECTS = {
         "OpenPBR 1.1 as MaterialX 1.39 prints it",
         exact=True,
         coat_index=True,
-        coat_masking="smith",
         passes="albedo",
         path="flat",
         edge_tint=True,
@@ -55,12 +54,6 @@ DIALECTS = {
     # glTF 2.0, appendix B, and the README of KHR_materials_clearcoat ("fresnel_coat").
     "gltf": Dialect(
         "glTF 2.0 with KHR_materials_clearcoat",
-        exact=False,
-        coat_index=False,
-        coat_masking="smith",
-        passes="view",
-        path=None,
-        edge_tint=False,
         layered=True,
     ),
     # Cycles 5.0, kernel/svm/closure.h, with the distribution GGX: the light that leaves is taken to go as the viewer looks.
@@ -68,8 +61,6 @@ DIALECTS = {
         "Blender 4 and 5, Principled BSDF in Cycles",
         exact=True,
         coat_index=True,
-        coat_masking="smith",
-        passes="view",
         path="view",
         edge_tint=True,
         layered=True,
@@ -77,23 +68,13 @@ DIALECTS = {
     # three.js, lights_physical_pars_fragment.glsl: the diffuse part is not attenuated by the lobe beside it.
     "three": Dialect(
         "three.js MeshPhysicalMaterial",
-        exact=False,
-        coat_index=False,
-        coat_masking="smith",
-        passes="view",
-        path=None,
-        edge_tint=False,
-        layered=False,
     ),
     # Babylon.js, pbrClearCoatFunctions and pbrDirectLightingFunctions.
     "babylon": Dialect(
         "Babylon.js PBRMaterial with a clear coat",
-        exact=False,
         coat_index=True,
         coat_masking="kelemen",
         passes="half",
         path="both",
-        edge_tint=False,
-        layered=False,
     ),
 }

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..documents import is_number
 from ..errors import InputError
 from . import words
 from .convert import Conversion
@@ -152,10 +151,7 @@ def _table(table: Any, key: str, where: str) -> dict[str, Any]:
 
 
 def _number(table: dict[str, Any], key: str, default: float, where: str) -> float:
-    value = table.get(key, default)
-    if not is_number(value):
-        raise InputError(f"{where}: {key} = {value!r}: should be a finite number")
-    return float(value)
+    return float(words.checked(table.get(key, default), default, f"{where}: {key}"))
 
 
 def _color(table: dict[str, Any], where: str) -> list[float]:

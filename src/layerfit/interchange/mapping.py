@@ -70,7 +70,7 @@ def _base(stack: Stack, coats: list[Any], dialect: str) -> Engine:
     if isinstance(stack.base, Conductor):
         return replace(engine, edge_tint=_edge_tint(below, f0)) if engine.rules.edge_tint else engine
     if len(lobes) == 1 and not coats and (isinstance(stack.base, Dielectric) or (diffuse is not None and f0.max() < BRIGHT)):
-        root = math.sqrt(min(float(f0.mean()), 0.2))
+        root = math.sqrt(min(float(f0.mean()), BRIGHT))
         return replace(engine, base="glossy", base_color=albedo, ior=(1.0 + root) / (1.0 - root))
     color = np.clip(f0 + albedo, 0.0, 1.0)
     return replace(engine, base="mixed", base_color=color, metallic=float(f0.mean() / max(color.mean(), 1e-6)))

@@ -73,7 +73,7 @@ def checked(value: Any, default: Any, where: str) -> Any:
         return value
     if isinstance(default, float) and is_number(value):
         return value
-    raise InputError(f"{where} = {value!r}: should be {'three numbers' if isinstance(default, list) else 'a number'}")
+    raise InputError(f"{where} = {value!r}: should be {'three numbers' if isinstance(default, list) else 'a finite number'}")
 
 
 def digits(value: Any) -> float:
