@@ -8,6 +8,8 @@ formula can give back.
 import dataclasses
 import functools
 import json
+import shutil
+import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from layerfit._compiled import fusion_emitters
 from layerfit.capture.exr import write_exr
@@ -26,6 +29,7 @@ from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
 from layerfit.render import predict
+from layerfit.shader.export import HEADERS, print_material
 from layerfit.stack import Stack, evaluate
 from layerfit.surfaces import (
     Blinn,
@@ -47,6 +51,12 @@ FLOOR = {np.float64: 1e-13, np.float32: 1e-6}
 
 # What is evaluated a few times only is compiled quickly rather than well: options for `jax.jit`, 2 to 4 times as quick.
 QUICKLY = {"xla_backend_optimization_level": 0} | fusion_emitters(newer=False)
+
+needs_tools = pytest.mark.skipif(
+    shutil.which("spirv-opt") is None or shutil.which("glslangValidator") is None,
+    reason="no spirv-opt; on Debian or Ubuntu: apt-get install -y glslang-tools spirv-tools",
+)
+"""Instructions are counted with what compiles shaders."""
 
 COPPER = {"eta": [0.201, 0.924, 1.102], "k": [3.913, 2.453, 2.142]}
 
@@ -239,6 +249,22 @@ APPROXIMATE: dict[str, Stack] = {
     "faithful, Lazanyi": Stack((varnish(fresnel="lazanyi"),), CookTorrance(fresnel="lazanyi", **COPPER), Faithful()),
 }
 """Fresnel reflectances that are not exact."""
+
+
+def every_text(stack: Stack) -> dict[str, str]:
+    """The shader of a material as files: its numbers as constants and as uniforms, in every language."""
+    printed = {uniforms: print_material(stack, "test", uniforms) for uniforms in (False, True)}
+    return {f"{target}_{uniforms}.frag": shader.text(target) for uniforms, shader in printed.items() for target in HEADERS}
+
+
+def compiles(folder: Path, files: Mapping[str, str], *options: str) -> None:
+    """Assert that shaders compile: all of them by one process, of a compiler that is of no driver. Skips where it is absent."""
+    if shutil.which("glslangValidator") is None:
+        pytest.skip("no glslangValidator; on Debian or Ubuntu: apt-get install -y glslang-tools")
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    ran = subprocess.run(["glslangValidator", *options, *files], cwd=folder, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout
 
 
 def sphere_view(stack: Stack, folder: Path, side: int) -> View:

@@ -1,11 +1,9 @@
 """Costs of shaders: instructions are counted the same every time, times are taken beside Phong, and what is at fault is said."""
 
-import shutil
-
 import numpy as np
 import pytest
 
-from helpers import STACKS
+from helpers import STACKS, needs_tools
 from layerfit.errors import InputError, MachineError
 from layerfit.shader import cost
 from layerfit.shader.cost import cost_text, instructions, phong, times, tools
@@ -13,11 +11,6 @@ from layerfit.shader.export import print_material
 
 PHONG, PHONG_LIGHT = 27, 18
 """Instructions of the hand-written shader under one light, and for each one more."""
-
-needs_tools = pytest.mark.skipif(
-    shutil.which("spirv-opt") is None or shutil.which("glslangValidator") is None,
-    reason="no spirv-opt; on Debian or Ubuntu: apt-get install -y glslang-tools spirv-tools",
-)
 
 
 @needs_tools

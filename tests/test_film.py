@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import itertools
-import subprocess
 from typing import Any
 
 import jax
@@ -12,7 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from helpers import COPPER, FLOOR, brdf, brdf_rows, cases, close, direction, hemisphere, sphere_view, varnish
+from helpers import COPPER, FLOOR, brdf, brdf_rows, cases, close, compiles, direction, hemisphere, sphere_view, varnish
 from layerfit.errors import InputError
 from layerfit.fit.fit import fit
 from layerfit.fit.result import parameters
@@ -334,11 +333,7 @@ def test_parity_of_saturated_films(gl, name):
 @each
 def test_validates(name, tmp_path):
     shader = print_material(FILMED[name], "test")
-    for target in HEADERS:
-        path = tmp_path / f"{target}.frag"
-        path.write_text(shader.text(target))
-        ran = subprocess.run(["glslangValidator", str(path)], capture_output=True, text=True, check=False)
-        assert ran.returncode == 0, ran.stdout
+    compiles(tmp_path, {f"{target}.frag": shader.text(target) for target in HEADERS})
 
 
 def test_what_has_no_film_has_nothing_of_it():

@@ -2,14 +2,13 @@
 
 import io
 import json
-import shutil
-import subprocess
 
 import gallery
 import numpy as np
 import pytest
 from PIL import Image
 
+from helpers import compiles
 from layerfit._data import shaders
 from layerfit.preset import read_preset
 from layerfit.shader.export import HEADERS, print_material
@@ -88,15 +87,8 @@ def test_the_shader_with_uniforms_is_valid(path, tmp_path):
 
 def validate(folder, texts):
     """Both languages, in one go."""
-    if shutil.which("glslangValidator") is None:
-        pytest.skip("no glslangValidator; on Debian or Ubuntu: apt-get install -y glslang-tools")
-    files = []
-    for name, text in texts.items():
-        for target, header in HEADERS.items():
-            files.append(folder / f"{name}_{target}.frag")
-            files[-1].write_text(text.replace(HEADERS[gallery.TARGET], header))
-    ran = subprocess.run(["glslangValidator", *map(str, files)], capture_output=True, text=True, check=False)
-    assert ran.returncode == 0, ran.stdout
+    both = lambda text: {target: text.replace(HEADERS[gallery.TARGET], header) for target, header in HEADERS.items()}  # noqa: E731
+    compiles(folder, {f"{name}_{target}.frag": one for name, text in texts.items() for target, one in both(text).items()})
 
 
 @pytest.mark.parametrize(

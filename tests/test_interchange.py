@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from commands import SCENE, TRUTH, layerfit, snapshot
-from helpers import COPPER, QUICKLY, hemisphere
+from helpers import COPPER, QUICKLY, compiles, hemisphere
 from layerfit import job
 from layerfit.errors import InputError
 from layerfit.interchange import blender, formats, gltf, materialx, openpbr, web
@@ -276,17 +276,11 @@ def test_three_js_gets_the_shader_itself():
 
 def test_the_stages_of_the_shader_for_three_js_fit_together(tmp_path):
     """Compiled and linked as WebGL 2 would, with the line that three.js puts in front."""
-    if shutil.which("glslangValidator") is None:
-        pytest.skip("no glslangValidator; on Debian or Ubuntu: apt-get install -y glslang-tools")
     text = web.write_three(conversion(engine("three", "metal with a grain", False), read_preset("brushed_steel")))
     vertex = text.partition("vertexShader: `")[2].partition("`")[0]
     fragment = json.loads(text.partition("fragmentShader: ")[2].rpartition(",\n});")[0])
-    for name, stage in (("a.vert", f"precision highp float;\n{vertex}"), ("a.frag", fragment)):
-        (tmp_path / name).write_text(f"#version 300 es\n{stage}")
-    ran = subprocess.run(
-        ["glslangValidator", "-l", "a.vert", "a.frag"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert ran.returncode == 0, ran.stdout
+    stages = {"a.vert": f"precision highp float;\n{vertex}", "a.frag": fragment}
+    compiles(tmp_path, {name: f"#version 300 es\n{stage}" for name, stage in stages.items()}, "-l")
 
 
 def test_names_are_those_of_every_format():

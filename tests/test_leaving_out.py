@@ -1,14 +1,13 @@
 """What a material does without costs nothing and changes nothing: one with the part at nothing against one that never had it."""
 
 import dataclasses
-import shutil
 from typing import NamedTuple
 
 import jax
 import numpy as np
 import pytest
 
-from helpers import COPPER, STACKS, brdf_rows, hemisphere, varnish
+from helpers import COPPER, STACKS, brdf_rows, hemisphere, needs_tools, varnish
 from layerfit.fit.parameters import free_by_default, parametrise
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
@@ -71,11 +70,6 @@ LEFT_OUT = {
         Stack((varnish(tau=[0.05, 0.2, 0.6]),), WOOD),
     ),
 }
-
-needs_tools = pytest.mark.skipif(
-    shutil.which("spirv-opt") is None or shutil.which("glslangValidator") is None,
-    reason="no spirv-opt; on Debian or Ubuntu: apt-get install -y glslang-tools spirv-tools",
-)
 
 
 @pytest.mark.parametrize("name", LEFT_OUT)

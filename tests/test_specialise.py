@@ -2,22 +2,19 @@
 
 import json
 import re
-import shutil
 
 import numpy as np
 import pytest
 
 from commands import layerfit, snapshot, write_reference
-from helpers import COPPER, STACKS, varnish
+from helpers import COPPER, STACKS, needs_tools, varnish
 from layerfit.preset import read_preset, write_preset
 from layerfit.render import brdf
 from layerfit.stack import Stack
 from layerfit.study.removals import removals
 from layerfit.surfaces import CarPaint, Conductor, Lambert
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("spirv-opt") is None, reason="no spirv-opt; on Debian or Ubuntu: apt-get install -y glslang-tools spirv-tools"
-)
+pytestmark = needs_tools
 
 METAL = {"type": "conductor", "name": "base", "alpha": 0.3, "eta": [1.0, 1.0, 1.0], "k": [4.0, 2.5, 2.0]}
 """A metal without a grain, whose index is the same in all channels, and whose extinction is not."""

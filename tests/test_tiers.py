@@ -1,13 +1,12 @@
 """Other ways to print one material: their errors are true, their shaders are their own JAX functions, and they are as short as promised."""
 
 import dataclasses
-import shutil
 
 import jax
 import numpy as np
 import pytest
 
-from helpers import COPPER, STACKS
+from helpers import COPPER, STACKS, needs_tools
 from layerfit._directions import random_pairs
 from layerfit.errors import InputError
 from layerfit.forms.corrected import Corrected
@@ -74,7 +73,7 @@ def test_the_exported_shader_draws_it_without_a_frame(gl, made):
     agree(drawn(with_lights(text, 2), lights), by_jax(stack, lights))
 
 
-@pytest.mark.skipif(not shutil.which("spirv-opt"), reason="spirv-opt, which instructions are counted with, is absent")
+@needs_tools
 @pytest.mark.parametrize("name", INSTRUCTIONS)
 def test_how_many_instructions(made, name):
     assert 2 * 27 < instructions(print_material(made[name].stack, "test")).total <= INSTRUCTIONS[name]
@@ -116,7 +115,7 @@ def test_short_fresnel_formulas_and_the_faithful_form():
         make_tier(stack, "compct")  # pyright: ignore[reportArgumentType]
 
 
-@pytest.mark.skipif(not shutil.which("spirv-opt"), reason="spirv-opt, which instructions are counted with, is absent")
+@needs_tools
 def test_the_cheapest_that_is_near_enough():
     stack = MATERIALS["corrected, diffuse"][0]
     assert choose_tier(stack, "test", max_error=1e-4).tier.name == "compact"

@@ -4,13 +4,12 @@ import csv
 import io
 import json
 import re
-import shutil
 
 import numpy as np
 import pytest
 
 from commands import layerfit, snapshot
-from helpers import STACKS, varnish
+from helpers import STACKS, needs_tools, varnish
 from layerfit.errors import MachineError
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.precise import Precise
@@ -25,9 +24,7 @@ from layerfit.study.variants import EXACT, variants
 from layerfit.surfaces import Conductor, Dielectric, Lambert
 from layerfit.tradeoffs import FILES, PARTS, against_walk
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("spirv-opt") is None, reason="no spirv-opt; on Debian or Ubuntu: apt-get install -y glslang-tools spirv-tools"
-)
+pytestmark = needs_tools
 
 GLASS = Stack((), Dielectric(alpha=0.3, eta=1.5))
 WOOD = Stack((), Lambert(albedo=[0.5, 0.28, 0.13]))

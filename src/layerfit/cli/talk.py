@@ -11,6 +11,7 @@ import os
 import shlex
 import sys
 import time
+from abc import ABC, abstractmethod
 from typing import Any
 
 from rich.console import Console
@@ -104,7 +105,7 @@ def detail(text: str) -> None:
         say(text)
 
 
-class _Bar:
+class _Bar(ABC):
     """A bar on standard error while something runs; nothing where that is not a terminal, or is to be quiet."""
 
     def __enter__(self) -> Any:
@@ -117,11 +118,13 @@ class _Bar:
         self.stage = ""
         return self.update
 
+    @abstractmethod
     def columns(self) -> tuple[Any, ...]:
-        raise NotImplementedError
+        """What stands in it."""
 
+    @abstractmethod
     def update(self, *told: Any) -> None:
-        raise NotImplementedError
+        """Say how far the work is."""
 
     def at(self, stage: str) -> None:
         """With `--verbose`, a line where a stage begins."""

@@ -81,6 +81,7 @@ def _apply(eqn: Any, args: list[Any]) -> Any:
         return [_each(getattr(numbers(), _MP[name]), *args)]
     if name in _MOVES or not any(arg.dtype == object for arg in args):
         return _moved(eqn, args)
+    # A primitive that a new form brings: without a rule there are no digits of it, and none are better than those of float64.
     raise NotImplementedError(f"no digits of the JAX primitive {name!r}")
 
 

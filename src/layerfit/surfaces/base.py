@@ -4,6 +4,7 @@ A form never asks what class a boundary is. Light that keeps its direction below
 that has lost it meets the diffuse part.
 """
 
+from abc import ABC, abstractmethod
 from functools import reduce
 from operator import add
 from typing import Any
@@ -26,24 +27,24 @@ def widened_variance(own: Scalar, added: Width | None) -> Scalar:
     return jnp.sqrt((own + added[0]) * (own + added[1])) if isinstance(added, tuple) else own + added
 
 
-class Lobe:
+class Lobe(ABC):
     """Light that is sent back about a direction: f = reflectance(c) shape(wi, wo, h)."""
 
     distribution: Distribution = "beckmann"
     """How widths add: those of Gaussian lobes by their squares."""
 
     @property
+    @abstractmethod
     def width(self) -> Width:
         """Width of the facets that would make such a lobe."""
-        raise NotImplementedError
 
+    @abstractmethod
     def reflectance(self, c: Scalar) -> Colour:
         """What the lobe takes its colour from, at the half cosine `c`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Any:
         """The rest [1/sr], of this lobe or of one widened to `width`; `h` is the half vector."""
-        raise NotImplementedError
 
     def widened(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, added: Width) -> Any:
         """The same of a Gaussian lobe that coats have widened to `width`, and its variance by `added`."""

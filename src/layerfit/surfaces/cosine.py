@@ -6,6 +6,7 @@ of energy. A coat over it counts no more than all of the light as coming back.
 """
 
 import math
+from abc import abstractmethod
 from typing import Any, Literal
 
 import jax.numpy as jnp
@@ -66,9 +67,9 @@ class CosineLobe(TwoParts, Lobe):
             return reflectance
         return jnp.minimum(reflectance / self.peak(self.exponent), 1.0)
 
+    @abstractmethod
     def peak(self, exponent: Scalar) -> Scalar:
         """Value of the normalised lobe of reflectance 1 at its peak [1/sr]."""
-        raise NotImplementedError
 
     def powered(self, one_minus: Scalar, wi: Vec3, exponent: Scalar | None) -> Scalar:
         """The lobe [1/sr] by 1 - cos; `exponent` is that of a widened one, which keeps its light, or None."""

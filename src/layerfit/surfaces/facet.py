@@ -1,5 +1,6 @@
 """What one facet reflects: the Fresnel reflectance of a metal or of a dielectric, exact or by an approximation."""
 
+from abc import ABC, abstractmethod
 from dataclasses import replace
 from typing import Any, Literal, Self
 
@@ -51,7 +52,7 @@ def metal_k() -> Any:
     return param(default=3.5, lower=0.0, upper=15.0, scale="softlog", doc=doc, colour=True, fitted=False)
 
 
-class Facet(Surface):
+class Facet(Surface, ABC):
     """A boundary with an index of refraction, absolute (against air); a coat above divides it by its own."""
 
     eta: Number
@@ -60,13 +61,13 @@ class Facet(Surface):
     lazanyi_alpha: Number = None
 
     @property
+    @abstractmethod
     def f0(self) -> Colour:
         """Reflectance of a facet at normal incidence."""
-        raise NotImplementedError
 
+    @abstractmethod
     def exact(self, c: Scalar) -> Colour:
         """Reflectance of a facet at the cosine `c`."""
-        raise NotImplementedError
 
     def approximate(self, c: Colour) -> Colour:
         """Its approximation, with the correction where there is one."""
