@@ -1,15 +1,12 @@
 """A headless Chromium for tests of pages: WebGL 2 by SwiftShader, so that no GPU is needed."""
 
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+from chromium import FLAGS, executable
 
 
 @contextmanager
@@ -17,7 +14,7 @@ def chromium() -> Iterator[Any]:
     """The browser; the test is skipped where there is none."""
     playwright = pytest.importorskip("playwright.sync_api", reason="pages are tested with playwright: pip install playwright")
     with playwright.sync_playwright() as p:
-        found = next((path for name in NAMES if (path := shutil.which(name))), None) or p.chromium.executable_path
+        found = executable(p)
         if not Path(found).exists():
             pytest.skip("no Chromium to test pages in: apt-get install chromium, or playwright install chromium")
         browser = p.chromium.launch(executable_path=found, args=FLAGS)

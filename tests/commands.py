@@ -98,8 +98,8 @@ SILENT = {"--help", "--version", "-q", "--quiet"}
 
 
 def check_next(arguments: tuple[Any, ...], ran: Ran) -> None:
-    """A command that has done its work names the next one in its last line, and that is a command."""
-    if ran.code not in (0, 1) or SILENT.intersection(arguments):
+    """A command that has done its work names the next one in its last line, and that is a command; `doctor` names what gets what is missing."""
+    if ran.code not in (0, 1) or SILENT.intersection(arguments) or (arguments[0], ran.code) == ("doctor", 1):
         return
     last = ran.err.rstrip().splitlines()[-1]
     assert last.startswith("Next: layerfit "), last

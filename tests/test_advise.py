@@ -34,7 +34,9 @@ def scene(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def advice(scene) -> Advice:
-    return advise(read_scene(scene))
+    """Of a scene whose fit would find ambient light too."""
+    read = read_scene(scene)
+    return advise(dataclasses.replace(read, fit=dataclasses.replace(read.fit, also=("light.ambient",))))
 
 
 def test_noise_averages_out_over_pixels_and_what_the_form_gets_wrong_does_not():
@@ -55,6 +57,13 @@ def test_where_nothing_is_told_a_parameter_lies_anywhere_in_its_range():
     lower, upper = free.bounds()
     nothing = Told(np.zeros((3, 3)), np.zeros((3, 3)))
     np.testing.assert_allclose(np.sqrt(np.diag(nothing.covariance(free))), (upper - lower) / np.sqrt(12.0))
+
+
+def test_what_is_taken_as_told_is_said(advice):
+    assert advice.as_told == ("light.ambient",)
+    assert "though a fit would find it: light.ambient." in sentences(advice)[-1]
+    said = sentences(dataclasses.replace(advice, as_told=(), shared=("base.albedo",)))
+    assert said[-1] == "Taken as the same in all references: base.albedo."
 
 
 def test_over_paint_another_thickness_of_the_lacquer_helps_most(advice):

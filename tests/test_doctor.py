@@ -62,6 +62,7 @@ def test_without_a_driver_the_main_job_cannot_be_done(monkeypatch):
     assert "MISSING: no OpenGL 3.3 driver was found" in ran.out
     assert "apt-get install -y --no-install-recommends libegl1 libgl1-mesa-dri" in ran.out
     assert "can NOT be done here" in ran.out
+    assert "Next:" not in ran.err, "the command that gets it stands in its lines"
 
 
 def test_a_driver_that_rounds_is_found_out(gl, monkeypatch):

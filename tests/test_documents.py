@@ -19,7 +19,7 @@ from commands import snapshot
 from layerfit import documents
 from layerfit.batch.table import journal, write_line
 from layerfit.capture.exr import read_exr, write_exr
-from layerfit.documents import of_ours, whole, write_bytes, write_files
+from layerfit.documents import of_ours, undisturbed, whole, write_bytes, write_files
 from layerfit.errors import InputError
 
 
@@ -197,3 +197,11 @@ def test_a_kill_leaves_nothing(tmp_path):
     except OSError as error:
         pytest.skip(f"files of {tmp_path} cannot be without a name: {error}")
     assert snapshot(tmp_path) == {}
+
+
+def test_a_handler_that_python_did_not_set_is_left_alone(monkeypatch):
+    """As in a program that Python is embedded in: it could not be put back."""
+    monkeypatch.setattr(signal, "getsignal", lambda number: None)
+    monkeypatch.setattr(signal, "signal", lambda number, handler: pytest.fail("it was replaced"))
+    with undisturbed():
+        pass

@@ -2,7 +2,9 @@
 
 import re
 import sys
+import types
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,3 +137,12 @@ def test_a_study_that_ran_shows_itself(gl, tmp_path):
     told = lf.specialise("bare_concrete", Path(__file__).parents[1] / "examples/references/brushed_steel.toml", tmp_path)
     assert isinstance(told, Told)
     assert told["in_words"][0] in re.sub(r"\s+", " ", told._repr_html_())
+
+
+def test_what_matplotlib_itself_lacks_is_not_said_to_be_matplotlib(monkeypatch):
+    package: Any = types.ModuleType("matplotlib")
+    package.__path__ = []
+    monkeypatch.setitem(sys.modules, "matplotlib", package)
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+    with pytest.raises(ModuleNotFoundError):
+        lf.plot_plane(lf.Stack((), lf.Lambert()))

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from commands import layerfit, snapshot, write_reference
+from commands import SCENE, layerfit, snapshot, write_reference
 from helpers import COPPER, STACKS, needs_tools, varnish
 from layerfit.preset import read_preset, write_preset
 from layerfit.render import brdf
@@ -63,6 +63,17 @@ def test_what_is_left_is_written(ran):
     assert {row["what"] for row in record["removed"]} >= {"base: anisotropy", "base: colour of eta"}
     assert "v_tangent" not in (folder / "material.frag").read_text()
     assert not re.search(r'(src|href)="(?!data:)', (folder / "specialise.html").read_text()), "it would fetch something"
+
+
+@pytest.mark.parametrize("words", ['also = ["light.ambient"]', 'each = ["base.alpha"]', 'also = ["coat.thickness_scale"]'])
+@pytest.mark.parametrize("command", ["specialise", "tradeoff"])
+def test_what_a_scene_asks_beyond_the_material_is_refused_before_any_work(command, words, tmp_path):
+    (tmp_path / "scene.toml").write_text(SCENE.replace("starts = 3", words))
+    ran = layerfit(command, "lacquered_copper", tmp_path / "scene.toml", "-o", tmp_path / "out")
+    assert ran.code == 2
+    assert f"fit asks for {words.split(chr(34))[1]}" in ran.err
+    assert command in ran.err
+    assert not (tmp_path / "out").exists()
 
 
 def test_parts_of_a_coated_metal(monkeypatch):

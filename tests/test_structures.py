@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from commands import layerfit
+from commands import SCENE, layerfit
 from helpers import hemisphere, sphere_view
 from layerfit.capture.load import load
 from layerfit.capture.measured.view import load_measured
@@ -91,6 +91,32 @@ def test_an_image_is_a_reference_too(tmp_path):
     choice = choose_structure([view], structures=SOME)
     assert choice.chosen.candidate.name == "coat_diffuse"
     np.testing.assert_allclose(choice.chosen.result.stack.layers[0].alpha, 0.15, rtol=0.02)
+
+
+def test_what_a_scene_asks_of_its_lights_is_fitted_beside_each_structure(tmp_path):
+    """Ambient light that nobody told of: from everywhere, a diffuse surface sends back its albedo of it."""
+    lit, radiance = sphere_view(TRUTHS["diffuse"], tmp_path, 24), 0.2
+    view = dataclasses.replace(lit, target=lit.target + radiance * np.asarray(TRUTHS["diffuse"].base.albedo, np.float32))
+    choice = choose_structure([view], structures=["diffuse"], also=("light.ambient",))
+    np.testing.assert_allclose(choice.chosen.result.lights[0]["ambient"], radiance, rtol=0.02)
+    np.testing.assert_allclose(choice.chosen.result.stack.base.albedo, TRUTHS["diffuse"].base.albedo, rtol=0.02)
+
+
+def test_of_what_a_scene_frees_the_lights_alone_are_passed_on(tmp_path, monkeypatch):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace("starts = 3", 'also = ["light.ambient", "base.k"]\neach = ["light.scale", "coat.alpha"]'))
+
+    class Passed(Exception):
+        pass
+
+    def passed(views, **options):
+        raise Passed(options["also"], options["each"])
+
+    monkeypatch.setattr("layerfit.structures.load", lambda scene: [])
+    monkeypatch.setattr("layerfit.structures.choose_structure", passed)
+    with pytest.raises(Passed) as found:
+        structures_of(path, tmp_path / "out")
+    assert found.value.args == (("light.ambient",), ("light.scale",))
 
 
 def test_flakes_are_tried_where_they_can_be_drawn(tmp_path):

@@ -94,14 +94,15 @@ def test_stages_are_lines_where_it_is_verbose(scene, tmp_path, capsys):
         ([], ["view", "o/preset.json"]),
         (["poor_fit", "correlated:a~b"], ["structures", "a.toml"]),
         (["not_identifiable:coat.tau"], ["advise", "a.toml", "--preset", "o/preset.json"]),
-        (["not_converged", "poor_fit"], ["fit", "a.toml", "--starts"]),
+        (["not_converged", "poor_fit"], ["fit", "a.toml", "--starts", "32", "--also", "light.ambient", "--also", "coat.tau"]),
         (["shader_differs", "poor_fit"], ["doctor"]),
     ],
 )
 def test_the_gravest_flag_of_a_fit_chooses_the_next_command(flags, words):
     from pathlib import Path
 
-    then = [str(word) for word in fitting._after_fit(flags, Path("a.toml"), Path("o"))]
+    again = ("fit", "a.toml", "--starts", 32, *fitting._words({"--start": None, "--also": ["light.ambient", "coat.tau"]}))
+    then = [str(word) for word in fitting._after_fit(flags, Path("a.toml"), Path("o"), again)]
     assert then[: len(words)] == words
     check_command(then)
 

@@ -9,13 +9,13 @@ Needs playwright and a Chromium; without a GPU, SwiftShader draws.
 
 import argparse
 import io
-import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from chromium import FLAGS, executable
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
@@ -25,9 +25,6 @@ from layerfit._data import references
 from layerfit.report import gallery
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox", "--disable-gpu-watchdog"]
-"""In software, without the watch that ends a driver which compiles for long."""
 SIZE = (1000, 860)
 """Of the window; a picture is two of them side by side, at half their width."""
 PASSES = 32
@@ -64,8 +61,7 @@ PAGES = {"report": (report, ".viewer"), "view": (preset, "h1"), "gallery": (pres
 def opened(path: Path, said: list[str]) -> Iterator[Any]:
     """A page when its scripts are ready; what it says on its console is added to `said`."""
     with sync_playwright() as p:
-        found = next((there for name in BROWSERS if (there := shutil.which(name))), p.chromium.executable_path)
-        browser = p.chromium.launch(executable_path=found, args=FLAGS)
+        browser = p.chromium.launch(executable_path=executable(p), args=FLAGS)
         page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))

@@ -6,6 +6,8 @@ import signal
 import sys
 from typing import Any
 
+from .errors import INTERRUPT_CODE, INTERRUPTED
+
 XLA_FLAGS = "--xla_backend_extra_options=xla_cpu_disable_loop_unrolling"
 """What compiles takes a fifth less time without unrolled loops, and runs no slower."""
 
@@ -28,8 +30,8 @@ def run() -> None:
 def _interrupted(*_: Any) -> None:
     """End at once, as all files are whole at any time. An exception would wait for the compiler's threads, and be lost in a library's callback."""
     cursor = "\x1b[?25h" if sys.stderr.isatty() else ""  # a progress bar hides it
-    os.write(2, f"{cursor}layerfit: interrupted; every file that was written is whole\n".encode())
-    os._exit(130)
+    os.write(2, f"{cursor}{INTERRUPTED}\n".encode())
+    os._exit(INTERRUPT_CODE)
 
 
 if __name__ == "__main__":

@@ -133,7 +133,8 @@ def _name(descriptor: int, path: Path, hidden: Path) -> None:
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
     """Ctrl-C waits for the end of what takes no time."""
-    if threading.current_thread() is not threading.main_thread():  # signals are for the main one
+    # Signals are for the main thread, and a handler that Python did not set cannot be put back.
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
         yield
         return
     came: list[int] = []

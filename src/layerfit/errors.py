@@ -1,5 +1,8 @@
 """The errors that users see: one message that says what, where, why and what to do."""
 
+INTERRUPTED, INTERRUPT_CODE = "layerfit: interrupted; every file that was written is whole", 130
+"""What is said after Ctrl-C, and the exit code: 128 and the number of the signal, as shells have it."""
+
 
 class LayerfitError(Exception):
     """Something outside the program is at fault: an input file, an argument or the machine. Exit code 2, no traceback."""

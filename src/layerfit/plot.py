@@ -86,6 +86,8 @@ def _axes(ax: "Axes | None") -> "Axes":
         return ax
     try:
         from matplotlib import pyplot  # pyright: ignore[reportMissingImports]
-    except ModuleNotFoundError:
+    except ModuleNotFoundError as error:
+        if error.name != "matplotlib":  # one that matplotlib itself needs: another fault
+            raise
         raise MachineError("figures need the package matplotlib: pip install 'layerfit[plot]'") from None
     return pyplot.subplots(figsize=(6.0, 4.0), layout="constrained")[1]

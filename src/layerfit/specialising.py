@@ -67,6 +67,7 @@ def specialise(
     directory = Path(directory)
     if not 0.0 < tolerance < 1.0:
         raise InputError(f"--tolerance {tolerance:g}: should be a part between 0 and 1, such as 0.5%")
+    fits.check_alone(read, stack, "specialise")
     check_directory(directory)
     device = {"renderer": renderer(), "counted_by": tools()}
     views = load(read)
@@ -160,16 +161,14 @@ def _length(stack: Stack) -> int:
 
 def _refitted(removal: Removal, task: fits.Task, request: FitRequest, held: frozenset[str], kept: Kept) -> Stack:
     """The material without the part, its other parameters fitted again; as it is where none is free."""
-    known = [key for key, (_, _, spec) in known_parameters(removal.stack).items() if spec.fitted or request.free is not None]
-    free = [
-        key for key in known if (request.free is None or key in request.free) and key not in held and key not in request.fixed
-    ]
+    asked = fits.free_in(request, removal.stack)
+    free = [key for key in known_parameters(removal.stack) if key in asked and key not in held and key not in request.fixed]
     if not free:
         return removal.stack
 
     def run() -> dict[str, Any]:
         views = [fits.thinned(view, PIXELS // len(task.views)) for view in task.views]
-        found = fit(views, removal.stack, free=free, metric=request.metric, starts=1, where="specialise")
+        found = fit(views, removal.stack, free=free, metric=request.metric, loss=request.loss, starts=1, where="specialise")
         return {key: np.asarray(value, np.float32).tolist() for key, value in found.free.values(found.vector).items()}
 
     return _with_values(removal.stack, kept.part(removal.what, run))

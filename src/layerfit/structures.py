@@ -11,6 +11,7 @@ from .capture.measured.read import is_measured
 from .capture.scene import FitRequest, MeasuredReference, Scene
 from .capture.scene_file import read_scene
 from .documents import check_directory, write_files
+from .fit.nuisances import of_the_scene
 from .fit.structures import choose_structure
 from .forms.corrected import Corrected
 from .job import Outcome, Progress, fit_scene
@@ -52,16 +53,21 @@ def structures_of(
 ) -> StructuresOutcome:
     """Choose the structure that a scene or a measured BRDF supports, fit it, and write all to `directory`.
 
-    A scene's `free`, `also`, `each` and `fixed` are of its own material and are not used. `min_half_deg` is for a measured BRDF that is
-    named itself. Raises `LayerfitError` for input or a machine that is at fault.
+    Of a scene's `free`, `also` and `each`, what is of its lights is fitted beside each structure; the rest, and `fixed`, are of its own material
+    and are not used. `min_half_deg` is for a measured BRDF that is named itself. Raises `LayerfitError` for input or a machine that is at fault.
     """
     path, directory = Path(path), Path(directory)
     scene = _scene(path, min_half_deg)
     check_directory(directory)
     searching = lambda stage, share: progress(stage, SEARCH * share)  # noqa: E731
-    choice = choose_structure(load(scene), structures=structures, metric=metric, seed=seed, progress=searching)
+    views = load(scene)
+    lights = of_the_scene(ANY, views)
+    asked = scene.fit
+    also = tuple(name for name in (*(asked.free or ()), *asked.also) if name in lights)
+    each = tuple(name for name in asked.each if name in lights)
+    choice = choose_structure(views, structures=structures, also=also, each=each, metric=metric, seed=seed, progress=searching)
     found = choice.chosen
-    request = dataclasses.replace(scene.fit, free=found.candidate.free, also=(), each=(), fixed={}, metric=metric, seed=seed)
+    request = dataclasses.replace(asked, free=found.candidate.free, also=also, each=each, fixed={}, metric=metric, seed=seed)
     outcome = fit_scene(dataclasses.replace(scene, start=found.result.stack, fit=request), directory, progress=progress)
     document = report.document(choice)
     text = json.dumps(document, indent=2, allow_nan=False) + "\n"

@@ -61,6 +61,8 @@ def tradeoff(
     name = name or ("material" if isinstance(preset, Stack) else Path(preset).stem)
     read = scene if scene is None or isinstance(scene, Scene) else read_scene(scene)
     directory = Path(directory)
+    if read and fit:
+        fits.check_alone(read, read.start, "tradeoff")
     check_directory(directory)
     views = load(read) if read else []
     device = {"renderer": renderer(), "machine": shaders.machine(), "tools": tools()}
@@ -170,7 +172,7 @@ def _fits(stack: Stack, scene: Scene | None, views: Sequence[AnyView], kept: Kep
             return [{"name": "fit", "absent": str(error)}]
     else:
         targets = [view.samples().target for view in views]
-        task = fits.Task(views, scene.start, scene.fit.free, dict(scene.fit.fixed), targets)
+        task = fits.Task(views, scene.start, fits.free_in(scene.fit, scene.start), dict(scene.fit.fixed), targets)
     rows, everything = [], list(fits.runs(task))
     for k, (name, run) in enumerate(everything):
         progress(name, 0.5 + 0.5 * k / len(everything))

@@ -10,7 +10,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from rich.markup import escape
 
-from ..errors import LayerfitError
+from ..errors import INTERRUPT_CODE, INTERRUPTED, LayerfitError
 from . import complete
 from .talk import Done, detail, finish, manner, say, stderr
 
@@ -94,8 +94,8 @@ def main() -> None:
     except LayerfitError as error:
         _refuse(error)
     except SystemExit as end:
-        if end.code == 130:  # what typer makes of an interrupt
-            say("layerfit: interrupted; every file that was written is whole")
+        if end.code == INTERRUPT_CODE:  # what typer makes of an interrupt
+            say(INTERRUPTED)
         raise
     except Exception as error:
         from ..doctor import at_fault

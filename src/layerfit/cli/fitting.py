@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,8 +12,8 @@ from . import complete
 from .app import Force, Loss, Metric, Output, Scene, Seed, Starts, check_choice, command
 from .talk import STARTED, Done, many, progress, say, show
 
-STARTS_MORE = 32
-"""Starts for a fit that did not converge with those that it had: the default is a quarter of them."""
+TIMES_MORE = 4
+"""Starts for a fit that did not converge, over those that it had."""
 
 
 @command()
@@ -64,14 +64,16 @@ def fit(
 
     use_compilation_cache()
     from ..capture.scene import LOSSES, METRICS
+    from ..capture.scene_file import MOST_STARTS, read_scene
     from ..job import fit_scene
 
     imported = time.perf_counter() - STARTED
     check_choice(loss, LOSSES, "--loss")
     check_choice(metric, METRICS, "--metric")
     with progress() as report:
+        read = read_scene(scene) if start is None else _starting(scene, start)
         outcome = fit_scene(
-            scene if start is None else _starting(scene, start),
+            read,
             output,
             import_s=imported,
             progress=report,
@@ -85,7 +87,10 @@ def fit(
             loss=loss,
         )
     _show_fit(outcome)
-    return Done(outcome.document, _after_fit(outcome.document["flags"], scene, output), outcome.good)
+    given = {"--start": start, "--also": also, "--each": each, "--metric": metric, "--loss": loss, "--seed": seed}
+    more = min(TIMES_MORE * (starts or read.fit.starts), MOST_STARTS)
+    again = ("fit", scene, "--starts", more, *_words(given), "-o", output)
+    return Done(outcome.document, _after_fit(outcome.document["flags"], scene, output, again), outcome.good)
 
 
 def _starting(scene: Path, start: Path) -> Any:
@@ -109,13 +114,19 @@ def _show_fit(outcome: Any) -> None:
         say(not_written(outcome.document["parity"]))
 
 
-def _after_fit(flags: Sequence[str], scene: Path, output: Path) -> tuple[Any, ...]:
-    """What the gravest flag of a fit asks for; without one, a look at the material."""
+def _words(given: Mapping[str, Any]) -> list[Any]:
+    """Options as they were given: one that may be repeated as often as it was."""
+    every = [(option, value if isinstance(value, list) else [value]) for option, value in given.items() if value is not None]
+    return [word for option, values in every for value in values for word in (option, value)]
+
+
+def _after_fit(flags: Sequence[str], scene: Path, output: Path, again: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What the gravest flag of a fit asks for, such as the same fit with more starts (`again`); without one, a look at the material."""
     found, preset = {flag.partition(":")[0] for flag in flags}, output / "preset.json"
     if "shader_differs" in found:
         return ("doctor",)
     if "not_converged" in found:
-        return "fit", scene, "--starts", STARTS_MORE, "-o", output
+        return again
     if "poor_fit" in found:
         return "structures", scene, "-o", output / "structures"
     if found & {"not_identifiable", "undetermined_direction", "correlated", "other_minimum", "lower_limit"}:
@@ -215,7 +226,8 @@ def batch(
             say(f"failed: {row['error']}")
     document = done.document
     say(f"{document['done']} done ({document['kept']} of them before), {document['failed']} failed: {document['table']}")
-    return Done(document, _after_batch(done.rows, output), done.good)
+    given = {"--starts": starts, "--metric": metric, "--loss": loss, "--seed": seed}
+    return Done(document, (*_after_batch(done.rows, output), *_words(given)), done.good)
 
 
 def _after_batch(rows: Sequence[Any], output: Path) -> tuple[Any, ...]:

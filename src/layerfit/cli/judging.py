@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ..stability.effort import Effort
 from .app import Force, Output, Preset, Scene, command
 from .talk import Done, progress, say, show
 
@@ -85,8 +86,9 @@ def tradeoff(
     return Done(document, ("export", preset, "--max-error", "0.01"))
 
 
-def _part(text: str) -> float:
-    """0.005, or 0.5%."""
+def _part(given: str | float) -> float:
+    """0.005, or 0.5%; typer sends what the option has by default here too."""
+    text = str(given)
     try:
         return float(text[:-1]) / 100.0 if text.endswith("%") else float(text)
     except ValueError:
@@ -135,13 +137,17 @@ def stability(
         str, typer.Argument(help="Part of the name of structures: precise, conductor, patina. Left out: all of them.")
     ] = "",
     output: Output = Path("out"),
-    corners: Annotated[int, typer.Option(min=2, max=CORNERS, help="Corners of the ranges of a structure, at most.")] = 128,
-    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of the corners that are drawn.")] = 0,
-    shaders: Annotated[bool, typer.Option(help="Draw the printed shaders too.")] = True,
+    corners: Annotated[
+        int, typer.Option(min=2, max=CORNERS, help="Corners of the ranges of a structure, at most.")
+    ] = Effort.corners,
+    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of the corners that are drawn.")] = Effort.seed,
+    shaders: Annotated[bool, typer.Option(help="Draw the printed shaders too.")] = Effort.shaders,
     digits: Annotated[
         int, typer.Option(min=0, max=1000, help="Materials of a structure that are compared with 50 digits (they need mpmath).")
-    ] = 4,
-    compact: Annotated[int, typer.Option(min=0, max=2, help="Materials of a structure whose compact tier is made.")] = 2,
+    ] = Effort.digits,
+    compact: Annotated[
+        int, typer.Option(min=0, max=2, help="Materials of a structure whose compact tier is made.")
+    ] = Effort.compact,
 ) -> Done:
     """Try every structure at the corners of its ranges and at grazing, normal, mirror and retro directions: do the numbers hold?
 
@@ -152,7 +158,7 @@ def stability(
     Example: `layerfit stability lambert -o out/stability`
     """
     from ..report.stability import table
-    from ..stability.sweep import Effort, stability_of
+    from ..stability.sweep import stability_of
 
     effort = Effort(corners, shaders, digits, compact, seed)
     with progress() as report:

@@ -19,7 +19,7 @@ from ..capture.scene import Constant, Directional, Reference, Scene
 from ..errors import InputError
 from ..stack import Stack
 from .blocks import STRATA, arrange, strata
-from .nuisances import depths, of_references
+from .nuisances import GREY, depths, of_references
 from .parameters import LIGHT, Parametrisation, parametrise, with_fixed
 from .residuals import Residuals
 from .uncertainty import WEAK_SIGMA
@@ -88,6 +88,10 @@ class Advice:
     sigma: np.ndarray
     """Predicted, in the coordinates of the fit."""
     candidates: list[Candidate]
+    as_told: tuple[str, ...] = ()
+    """What a fit of the scene would find beside these, and is taken here as the scene says."""
+    shared: tuple[str, ...] = ()
+    """What a fit would find for each reference, and is taken here as the same in all."""
 
     @property
     def determined(self) -> dict[str, bool]:
@@ -119,11 +123,13 @@ def advise(
             f"{scene.path}: advice is for renders, which have lights and a camera; this scene has measured BRDFs alone"
         )
     stack = with_fixed(scene.start if stack is None else stack, scene.fit.fixed, f"{where}.fixed")
-    scenes = of_references(stack, references).keys() - {LIGHT}  # of these, brightness alone is among what is told
+    # Of these, the brightness of all lights alone is among what is told: an image that could be made has lights of its own.
+    scenes = of_references(stack, references).keys() - {LIGHT, f"{LIGHT}.{GREY}"}
     request = scene.fit
     asked, also, each = (
         names and [name for name in names if name not in scenes] for names in (request.free, request.also, request.each)
     )
+    as_told = tuple(name for name in (*(request.free or ()), *request.also, *request.each) if name in scenes)
     stack, free = parametrise(stack, asked, tuple(request.fixed), where, also=also or (), each=each or ())
     with jax.enable_x64(True):
         ask = _Asked(scene, stack, free, seed)
@@ -136,7 +142,9 @@ def advise(
             found.append(Candidate(image, _gain(before, after), float(np.sqrt(np.max(np.diag(after))))))
             progress("images", (k + 1) / len(images))
     found.sort(key=lambda candidate: -candidate.gain)
-    return Advice(stack, free, ask.u, np.sqrt(np.diag(before)), found)
+    return Advice(
+        stack, free, ask.u, np.sqrt(np.diag(before)), found, as_told, tuple(each or ()) if len(references) > 1 else ()
+    )
 
 
 def _gain(before: np.ndarray, after: np.ndarray) -> float:

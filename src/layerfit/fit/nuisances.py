@@ -22,6 +22,11 @@ DEPTHS = ("thickness_um", "tau", "tau_s", "kx", "sx")
 """Fields that grow with the thickness of their layer."""
 
 
+def of_a_scene(name: str) -> bool:
+    """Whether a parameter is of a scene by its name: where no layer is called `light`."""
+    return name.startswith(f"{LIGHTS}.") or name.endswith(f".{THICKNESS}")
+
+
 def depths(layer: Any) -> list[str]:
     """Fields of a layer that grow with its thickness; of several layers of pigment, those of the outermost."""
     return [name for name in DEPTHS if getattr(layer, name, None) is not None]

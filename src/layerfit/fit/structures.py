@@ -115,14 +115,17 @@ def choose_structure(
     views: Sequence[AnyView],
     *,
     structures: Sequence[str] | None = None,
+    also: Sequence[str] = (),
+    each: Sequence[str] = (),
     metric: str = "log",
     seed: int = 0,
     progress: Callable[[str, float], None] = lambda stage, share: None,
 ) -> StructureChoice:
     """Fit candidate structures to references, renders or measured BRDFs, and choose the simplest that explains them.
 
-    `structures` are names of candidates (left out: all). Of those within `STRONG` of the lowest BIC, the one with the fewest coats is
-    chosen, then that with the fewest parameters. Raises `InputError` for a name that is not one.
+    `structures` are names of candidates (left out: all). `also` and `each` are what is fitted of the lights beside each of them, as in `fit`. Of
+    those within `STRONG` of the lowest BIC, the one with the fewest coats is chosen, then that with the fewest parameters. Raises `InputError` for
+    a name that is not one.
     """
     thinned = [_thinned(view, seed) for view in views]
     samples = [view.samples() for view in thinned]
@@ -133,7 +136,15 @@ def choose_structure(
         if candidate.after in results:
             candidate = candidate.started_from(results[candidate.after][1].stack)
         found = fit(
-            thinned, candidate.stack, free=candidate.free, metric=metric, starts=STARTS, seed=seed, where=candidate.name
+            thinned,
+            candidate.stack,
+            free=candidate.free,
+            also=also,
+            each=each,
+            metric=metric,
+            starts=STARTS,
+            seed=seed,
+            where=candidate.name,
         )
         results[candidate.name] = candidate, found
     return _judged(list(results.values()), metric)

@@ -58,7 +58,9 @@ def sentences(advice: Advice) -> list[str]:
         best.setdefault(candidate.image.kind, candidate)
     kinds = [f"Best {kind}: {c.image.what}; errors {c.gain:.3g} times smaller." for kind, c in best.items()]
     steady = min(advice.candidates, key=lambda c: c.worst)
-    return [told, *kinds, f"Best for what is known least, {advice.least_known}: {steady.image.what}."]
+    taken = [f"Taken as the scene says, though a fit would find it: {', '.join(advice.as_told)}."] if advice.as_told else []
+    taken += [f"Taken as the same in all references: {', '.join(advice.shared)}."] if advice.shared else []
+    return [told, *kinds, f"Best for what is known least, {advice.least_known}: {steady.image.what}.", *taken]
 
 
 def lines(found: Mapping[str, Any]) -> list[str]:

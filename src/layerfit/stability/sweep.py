@@ -21,6 +21,7 @@ from ..stack import Stack
 from ..study.kept import Kept
 from . import limits, shader
 from .digits import numbers
+from .effort import USUAL, Effort
 from .exact import in_exact, judged
 from .grid import POLAR_DEG, Grid, directions, grid
 from .measure import Values, plain_values, slope_error, value_error, values_of
@@ -34,24 +35,10 @@ PARTS = "stability.parts.json"
 Progress = Callable[[str, float], None]
 
 
-@dataclasses.dataclass(frozen=True)
-class Effort:
-    """How much is tried of one structure."""
-
-    corners: int = 128
-    """Of the ranges, of as many as there are."""
-    shaders: bool = True
-    digits: int = 4
-    """Materials that are compared with 50 digits; none at 0."""
-    compact: int = 2
-    """Materials whose compact tier is made."""
-    seed: int = 0
-
-
 def sweep(
     word: str = "",
     *,
-    effort: Effort = Effort(),
+    effort: Effort = USUAL,
     parts: Path | None = None,
     progress: Progress = lambda stage, share: None,
 ) -> dict[str, Any]:
@@ -100,7 +87,7 @@ def _over(case: Mapping[str, Any]) -> float:
     return math.inf if case["over"] is None else case["over"]
 
 
-def try_structure(name: str, stack: Stack, effort: Effort = Effort()) -> dict[str, Any]:
+def try_structure(name: str, stack: Stack, effort: Effort = USUAL) -> dict[str, Any]:
     """One structure: how many digits float32 has of values and derivatives, what is not finite, and what physics says and does not hold."""
     tried = grid(stack, effort.corners, effort.seed)
     wi, wo, polar = (a.astype(np.float32) for a in directions())

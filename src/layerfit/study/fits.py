@@ -12,9 +12,12 @@ from scipy.optimize import least_squares
 
 from ..capture.load import AnyView
 from ..capture.measured.sphere import bare_sphere
+from ..capture.scene import FitRequest, Scene
+from ..errors import InputError
 from ..fit.blocks import arrange, stratified, weighted
 from ..fit.fit import fit
-from ..fit.parameters import parametrise
+from ..fit.nuisances import of_a_scene
+from ..fit.parameters import free_by_default, known_parameters, parametrise
 from ..fit.residuals import Residuals, initial, scaled
 from ..fit.starts import space_filling
 from ..fit.weights import inverse_sigma
@@ -49,6 +52,22 @@ class Task:
         models = [predict(scaled(stack, view.scales(stack)), *view.samples().arrays) for view in self.views]
         pairs = list(zip(models, self.truth, strict=True))
         return float(np.sqrt(sum(np.sum((m - t) ** 2) for m, t in pairs) / sum(np.sum(t**2) for _, t in pairs)))
+
+
+def check_alone(scene: Scene, stack: Stack, command: str) -> None:
+    """Raise `InputError` where a scene asks to fit more than a material: `command` holds the rest as the scene says."""
+    request, known = scene.fit, known_parameters(stack)
+    of_scene = [name for name in (*(request.free or ()), *request.also) if name not in known and of_a_scene(name)]
+    if beyond := [*(f"{name} in each reference" for name in request.each), *of_scene]:
+        raise InputError(
+            f"{scene.path}: fit asks for {beyond[0]}, which `layerfit fit` finds; {command} takes lights and thicknesses as the scene says, and "
+            "one material for all references. Leave it out of [fit], and say its value in the scene"
+        )
+
+
+def free_in(request: FitRequest, stack: Stack) -> tuple[str, ...]:
+    """What a scene frees of a material."""
+    return (*(free_by_default(stack) if request.free is None else request.free), *request.also)
 
 
 def drawn_task(stack: Stack, free: tuple[str, ...] | None = None, seed: int = 0) -> Task:
