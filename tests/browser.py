@@ -1,5 +1,6 @@
 """A headless Chromium for tests of pages: WebGL 2 by SwiftShader, so that no GPU is needed."""
 
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -45,3 +46,20 @@ def until(page: Any, expression: str) -> None:
             return
         page.wait_for_timeout(50)
     pytest.fail(f"{expression} has not become so in half a minute")
+
+
+def evaluated(page: Any, script: str, value: Any = None) -> Any:
+    """What a script gives, without lists of arrays that turn to objects on their way."""
+    return json.loads(page.evaluate(f"async (x) => JSON.stringify(await ({script})(x))", value))
+
+
+def small(side: str) -> str:
+    """A script that makes every picture of a gallery so small that a processor draws it at once."""
+    return f"document.querySelectorAll('.tile .picture').forEach((e) => {{ e.style.width = e.style.height = '{side}'; }})"
+
+
+def pictured(page: Any, k: int) -> None:
+    """A tile that is not live shows a picture."""
+    image = page.locator(".tile img").nth(k)
+    assert image.is_visible()
+    assert image.evaluate("(e) => e.complete && e.naturalWidth > 0")

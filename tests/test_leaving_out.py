@@ -116,11 +116,11 @@ INSTRUCTIONS = {
     "corrected, clear coat": 419,
     "corrected, anisotropic": 462,
     "corrected, three layers": 699,
-    "precise over lambert": 421,
-    "precise over conductor": 747,
+    "precise over lambert": 385,
+    "precise over conductor": 711,
     "faithful over conductor": 226,
-    "flakes": 465,
-    "corrected over flakes": 1104,
+    "flakes": 449,
+    "corrected over flakes": 1020,
 }
 """Of shaders under one light, after spirv-opt -O: the same on every machine, so that a longer shader does not go unseen."""
 

@@ -16,7 +16,10 @@ pytest.importorskip("anywidget", reason="pip install 'layerfit[notebook]'")
 NAME = "bare_concrete"
 """Its shader is the quickest to compile."""
 
-HOST = """<!doctype html><meta charset="utf-8"><body data-jp-theme-light="false"><div id="cell" style="width: 700px"></div></body>"""
+HOST = """<!doctype html><meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src blob:; style-src 'unsafe-inline'">
+<body data-jp-theme-light="false"><div id="cell" style="width: 700px"></div></body>"""
+"""As strict as a notebook's page may be, VS Code's among them: the module itself, styles, and neither requests nor evaluated text."""
 
 MODEL = """([source, material, values]) => {
     const bytes = Uint8Array.from(atob(material), (c) => c.charCodeAt(0));
@@ -54,6 +57,7 @@ def cell(widget):
         said = []
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: said.append(request.url) if not request.url.startswith("blob:") else None)
         page.set_content(HOST)
         page.evaluate(MODEL, [widget._esm, base64.b64encode(widget._material).decode(), widget.values])
         until(page, "view.passes > 0")

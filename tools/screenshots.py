@@ -2,7 +2,6 @@
 
     python tools/screenshots.py            the report of a fit, the view of a preset, the gallery
     python tools/screenshots.py view       one of them
-    python tools/screenshots.py --whole    nothing is written: the gallery of every preset that ships is drawn from end to end
 
 Needs playwright and a Chromium; without a GPU, SwiftShader draws.
 """
@@ -86,7 +85,7 @@ SEEN = "layerfit.views.filter((v) => v.visible)"
 def shots(path: Path, top: str) -> Iterator[Image.Image]:
     """A page in light and in dark, from an element downwards, when all in sight is drawn."""
     with opened(path, []) as page:
-        page.evaluate(f"layerfit.views.forEach((v) => {{ v.limit = {PASSES}; }})")
+        page.evaluate(f"layerfit.views.forEach((v) => {{ v.limit = {PASSES}; v.wanted = true; }})")
         page.evaluate(f"window.scrollTo(0, document.querySelector({top!r}).getBoundingClientRect().top - 24)")
         page.wait_for_timeout(500)  # until the page knows what is in sight
         until(page, f"{SEEN}.length && {SEEN}.every((v) => v.passes >= v.limit)")
@@ -109,39 +108,9 @@ def write(name: str) -> None:
     print(f"{name}.webp: {(IMAGES / f'{name}.webp').stat().st_size // 1000} kB")
 
 
-def whole() -> None:
-    """Scroll through the gallery of every preset: each is drawn once, no context is lost, nothing is said."""
-    said: list[str] = []
-    with tempfile.TemporaryDirectory() as folder, opened(presets(Path(folder)), said) as page:
-        page.evaluate("layerfit.lost = 0")
-        page.evaluate("layerfit.views[0].renderer.canvas.addEventListener('webglcontextlost', () => { layerfit.lost++; })")
-        page.evaluate("layerfit.views.forEach((v) => { v.limit = 1; v.drawn = false; })")
-        count = page.evaluate("layerfit.views.length")
-        for k in range(count):
-            page.evaluate(f"layerfit.views[{k}].canvas.scrollIntoView({{ block: 'center' }})")
-            until(page, f"layerfit.views[{k}].passes > 0")
-            page.evaluate(f"layerfit.views[{k}].drawn = {PIXEL.format(k=k)}")
-        drawn, lost = page.evaluate("layerfit.views.filter((v) => v.drawn).length"), page.evaluate("layerfit.lost")
-    print(f"{drawn} of {count} presets drawn, {lost} contexts lost, said: {said or 'nothing'}")
-    raise SystemExit(drawn != count or lost > 0 or bool(said))
-
-
-PIXEL = """(() => {{
-    const {{ canvas }} = layerfit.views[{k}];
-    const seen = document.createElement("canvas").getContext("2d", {{ willReadFrequently: true }});
-    seen.drawImage(canvas, canvas.width >> 1, canvas.height >> 1, 1, 1, 0, 0, 1, 1);
-    const [r, g, b, a] = seen.getImageData(0, 0, 1, 1).data;
-    return a === 255 && Math.max(r, g, b) > 8;
-}})()"""
-"""Whether the middle of a canvas is lit and covered."""
-
-
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("page", nargs="*", metavar="|".join(PAGES))
-    parser.add_argument("--whole", action="store_true")
     asked = parser.parse_args()
-    if asked.whole:
-        whole()
     for name in asked.page or PAGES:
         write(name)

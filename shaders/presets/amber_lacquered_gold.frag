@@ -64,16 +64,16 @@ const Coat lf_shellac = Coat(
 const Interface lf_shellac_interface = Interface(
     0.010720346,                                                   // tilt: turn of the mean facet towards a grazing direction
     0.009790741,                                                   // gain: part of the reflected light that a second facet lets in
-    vec4(-0.010497774, 0.02325947, -0.025306055, 0.028166985),     // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.011702711, -0.027349392, 0.027280606, -0.0044057295),  // passed_high: the other four, of higher powers
-    vec4(1.0082508, -0.018169582, 0.016717792, -0.0094463825),     // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.03654766, -0.04791355, -0.005047798, 0.020481586),      // bend_high: 
-    vec4(0.62824637, -0.30009365, -0.014748782, 0.030863881),      // spread: width of a lobe seen through it
+    vec4(-0.010497774, 0.023259478, -0.025306048, 0.028166955),    // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.011702711, -0.027349332, 0.027280606, -0.0044057593),  // passed_high: the other four, of higher powers
+    vec4(1.0082508, -0.018169343, 0.016718268, -0.00944829),       // bend: sine of the refracted light over that at a smooth interface
+    vec4(0.036545753, -0.04791069, -0.0050463676, 0.020480156),    // bend_high: 
+    vec4(0.6282463, -0.30009377, -0.014748305, 0.030863881),       // spread: width of a lobe seen through it
     vec4(0.6599215, -0.8535671, -0.21940088, 0.4492488),           // spread_high: 
-    vec4(1.0153365, -0.03897652, 0.035580754, -0.035983562),       // path: mean path over that of the refracted direction
-    vec4(0.12775612, -0.12147713, -0.060610294, 0.07959652),       // path_high: 
-    vec4(0.029641764, -0.0909491, 0.11677005, 0.01921773),         // theta: scale of the path's distribution
-    vec4(0.17687947, -0.5589623, -0.033911437, 0.3727157)          // theta_high: 
+    vec4(1.0153366, -0.03897676, 0.03558123, -0.035981655),        // path: mean path over that of the refracted direction
+    vec4(0.12775707, -0.12147713, -0.060610294, 0.07959652),       // path_high: 
+    vec4(0.029641764, -0.09094909, 0.11677008, 0.01921773),        // theta: scale of the path's distribution
+    vec4(0.17687947, -0.55896205, -0.033911437, 0.3727157)         // theta_high: 
 );
 
 const Conductor lf_gold = Conductor(
@@ -83,35 +83,34 @@ const Conductor lf_gold = Conductor(
 );
 
 const Curve lf_shellac_again = Curve(
-    vec3(0.13500994, 0.10659347, 0.052700855),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.016772034, -0.012792338, -0.005902807),    // c1: 
-    vec3(-0.035883337, -0.02734765, -0.0123732),       // c2: 
-    vec3(-0.035731077, -0.025867224, -0.010901198),    // c3: 
-    vec3(0.016766384, 0.013030857, 0.0046977997),      // c4: 
-    vec3(0.013569355, 0.004614532, -0.001817748),      // c5: 
-    vec3(-0.0069269985, -0.005518511, -0.0014830232),  // c6: 
-    vec3(-0.007838428, -0.0020869672, 0.0018642098)    // c7: 
+    vec3(0.13500999, 0.10659348, 0.05270086),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.016771896, -0.012792233, -0.0059027476),  // c1: 
+    vec3(-0.035883732, -0.027347874, -0.012373297),   // c2: 
+    vec3(-0.035732463, -0.025868446, -0.010901757),   // c3: 
+    vec3(0.01676713, 0.013031229, 0.0046980083),      // c4: 
+    vec3(0.013571978, 0.0046173036, -0.0018164814),   // c5: 
+    vec3(-0.0069274902, -0.00551863, -0.0014831424),  // c6: 
+    vec3(-0.007839978, -0.0020888448, 0.0018635094)   // c7: 
 );
 
 const Curve lf_shellac_rest = Curve(
-    vec3(0.9083795, 0.60383517, 0.28149888),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.13272756, -0.089472674, -0.04318127),  // c1: 
-    vec3(-0.19509089, -0.1445109, -0.08247894),    // c2: 
-    vec3(-0.20047998, -0.15425837, -0.09698194),   // c3: 
-    vec3(0.15642226, 0.14233851, 0.095291615),     // c4: 
-    vec3(0.26577997, 0.23432422, 0.17387569),      // c5: 
-    vec3(-0.094190836, -0.09081018, -0.06316686),  // c6: 
-    vec3(-0.17685461, -0.15596676, -0.116191804)   // c7: 
+    vec3(0.90837955, 0.6038352, 0.28149885),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.13272768, -0.08947232, -0.043181125),  // c1: 
+    vec3(-0.19509143, -0.14451092, -0.082478955),  // c2: 
+    vec3(-0.20047998, -0.1542598, -0.0969826),     // c3: 
+    vec3(0.15642369, 0.14233863, 0.09529179),      // c4: 
+    vec3(0.26578188, 0.23432875, 0.17387652),      // c5: 
+    vec3(-0.09419179, -0.09081042, -0.06316668),   // c6: 
+    vec3(-0.17685461, -0.15596747, -0.11619192)    // c7: 
 );
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
     float s = x / (2.0 + x);
     float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float far = log(1.0 + x);
+    return abs(x) > 0.3 ? far : near;
 }
 
 vec3 lf_log1p(vec3 x) {

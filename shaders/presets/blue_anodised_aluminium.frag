@@ -62,7 +62,7 @@ const Coat lf_oxide = Coat(
 );
 
 const Interface lf_oxide_interface = Interface(
-    0.046419468,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.046419457,                                                // tilt: turn of the mean facet towards a grazing direction
     0.10031511,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.03934908, 0.026510041, 0.032650657, -0.022436477),  // passed: energy that passes, beyond the closed form: four coefficients
     vec4(-0.0328139, 0.028090157, 0.009836316, -0.011298083),   // passed_high: the other four, of higher powers
@@ -83,35 +83,34 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.0030880119, 0.033689808, 0.20722334),       // c0: coefficients of the powers of the curves' argument
-    vec3(0.00033428497, 0.0010511866, -0.0127656795),  // c1: 
-    vec3(-4.8079528e-05, -0.001324553, -0.008934662),  // c2: 
-    vec3(0.00026468746, 0.0013034716, 7.2062016e-05),  // c3: 
-    vec3(-0.00032590423, -0.004242532, -0.02862066),   // c4: 
-    vec3(-0.0004295539, -0.0029876828, -0.009335279),  // c5: 
-    vec3(0.0002061855, 0.002273336, 0.013568103),      // c6: 
-    vec3(0.00017652847, 0.0010340214, 0.0032043457)    // c7: 
+    vec3(0.0030880119, 0.033689808, 0.20722333),         // c0: coefficients of the powers of the curves' argument
+    vec3(0.00033428776, 0.0010512136, -0.012765687),     // c1: 
+    vec3(-4.8073707e-05, -0.0013245158, -0.008934706),   // c2: 
+    vec3(0.0002646735, 0.0013033152, 7.18832e-05),       // c3: 
+    vec3(-0.0003259182, -0.0042426437, -0.028620481),    // c4: 
+    vec3(-0.00042953342, -0.0029874146, -0.0093358755),  // c5: 
+    vec3(0.00020619854, 0.0022734255, 0.013568103),      // c6: 
+    vec3(0.00017651357, 0.0010339171, 0.0032047033)      // c7: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.15604743, 0.32811666, 0.678485),              // c0: coefficients of the powers of the curves' argument
-    vec3(0.001229018, -0.009724639, -0.042871),          // c1: 
-    vec3(-0.0046860278, -0.018908054, -0.033714473),     // c2: 
-    vec3(-0.008842051, -0.014170766, -0.025995493),      // c3: 
-    vec3(-0.008658707, -0.0082012415, -0.017253399),     // c4: 
-    vec3(-0.00036931038, -0.0011827946, -0.0058398247),  // c5: 
-    vec3(0.0001526177, 0.00038856268, 0.00034487247),    // c6: 
-    vec3(-0.00084525347, 0.0006644726, 0.0036985874)     // c7: 
+    vec3(0.15604748, 0.32811666, 0.67848504),            // c0: coefficients of the powers of the curves' argument
+    vec3(0.0012291037, -0.00972449, -0.042870864),       // c1: 
+    vec3(-0.0046861917, -0.018908083, -0.03371489),      // c2: 
+    vec3(-0.008842379, -0.014172435, -0.025995731),      // c3: 
+    vec3(-0.00865829, -0.008200526, -0.017253399),       // c4: 
+    vec3(-0.00036859512, -0.0011799335, -0.0058374405),  // c5: 
+    vec3(0.00015223026, 0.00038832426, 0.00034427643),   // c6: 
+    vec3(-0.0008455515, 0.00066280365, 0.0036976337)     // c7: 
 );
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
     float s = x / (2.0 + x);
     float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float far = log(1.0 + x);
+    return abs(x) > 0.3 ? far : near;
 }
 
 vec3 lf_log1p(vec3 x) {

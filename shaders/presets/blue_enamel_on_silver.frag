@@ -62,7 +62,7 @@ const Coat lf_glass = Coat(
 );
 
 const Interface lf_glass_interface = Interface(
-    0.0031546697,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.0031546694,                                                  // tilt: turn of the mean facet towards a grazing direction
     0.0015962153,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.0034488544, 0.010398303, -0.0076261554, 0.004548927),  // passed: energy that passes, beyond the closed form: four coefficients
     vec4(-0.041852664, 0.044587526, 0.026298596, -0.03314644),     // passed_high: the other four, of higher powers
@@ -83,35 +83,34 @@ const Conductor lf_silver = Conductor(
 );
 
 const Curve lf_glass_again = Curve(
-    vec3(0.0038955067, 0.013052011, 0.09742239),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.00016323687, -0.0007246011, -0.006919749),  // c1: 
-    vec3(0.0024450594, 0.007881798, 0.048320144),       // c2: 
-    vec3(0.0056149494, 0.018423505, 0.11570868),        // c3: 
-    vec3(-0.0068313647, -0.022907835, -0.15350646),     // c4: 
-    vec3(-0.014042404, -0.0465388, -0.2998398),         // c5: 
-    vec3(0.0046133623, 0.015405439, 0.10258278),        // c6: 
-    vec3(0.0088485945, 0.029262401, 0.18792582)         // c7: 
+    vec3(0.0038955081, 0.013052014, 0.0974224),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0001632435, -0.000724623, -0.006919913),  // c1: 
+    vec3(0.0024450268, 0.007881692, 0.048319347),     // c2: 
+    vec3(0.0056150034, 0.018423636, 0.11570987),      // c3: 
+    vec3(-0.00683129, -0.022907589, -0.15350464),     // c4: 
+    vec3(-0.014042523, -0.046539173, -0.2998429),     // c5: 
+    vec3(0.004613322, 0.015405316, 0.10258183),       // c6: 
+    vec3(0.008848667, 0.029262625, 0.18792772)        // c7: 
 );
 
 const Curve lf_glass_rest = Curve(
-    vec3(0.22183008, 0.3276662, 0.73278874),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.029395297, -0.039315037, -0.07268216),  // c1: 
-    vec3(0.044346154, 0.042232603, 0.019263268),    // c2: 
-    vec3(0.19990933, 0.21983123, 0.23053217),       // c3: 
-    vec3(-0.124152005, -0.1339004, -0.16359425),    // c4: 
-    vec3(-0.42810786, -0.47462773, -0.5433326),     // c5: 
-    vec3(0.07025856, 0.075478256, 0.09051204),      // c6: 
-    vec3(0.24533558, 0.27184522, 0.30928445)        // c7: 
+    vec3(0.2218301, 0.32766622, 0.7327888),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.029395536, -0.039315462, -0.07268235),  // c1: 
+    vec3(0.04434569, 0.042232335, 0.01926279),      // c2: 
+    vec3(0.19991064, 0.21983385, 0.23053408),       // c3: 
+    vec3(-0.12415075, -0.13390028, -0.16359258),    // c4: 
+    vec3(-0.42811036, -0.4746325, -0.54333925),     // c5: 
+    vec3(0.07025772, 0.0754779, 0.09051132),        // c6: 
+    vec3(0.24533737, 0.2718482, 0.3092873)          // c7: 
 );
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
     float s = x / (2.0 + x);
     float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float far = log(1.0 + x);
+    return abs(x) > 0.3 ? far : near;
 }
 
 vec3 lf_log1p(vec3 x) {

@@ -50,7 +50,7 @@ const Coat lf_candy = Coat(
 const Interface lf_candy_interface = Interface(
     1.5,            // n: index of the medium below, against air
     0.02,           // alpha: width of the facets, mean of the axes
-    0.0031546697,   // tilt: turn of the mean facet towards a grazing direction
+    0.0031546694,   // tilt: turn of the mean facet towards a grazing direction
     0.0015962153,   // gain: part of the reflected light that a second facet lets in
     0.00010262683,  // lengthening: path added by the spread of refracted directions, in thicknesses
     0.036786783     // drift: scale of the path added at grazing angles
@@ -68,12 +68,11 @@ const Flakes lf_flakes = Flakes(
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
     float s = x / (2.0 + x);
     float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float far = log(1.0 + x);
+    return abs(x) > 0.3 ? far : near;
 }
 
 vec3 lf_log1p(vec3 x) {
@@ -82,10 +81,9 @@ vec3 lf_log1p(vec3 x) {
 
 // exp(x) - 1 without the cancellation near 0.
 float lf_expm1(float x) {
-    if (abs(x) > 0.4) {
-        return exp(x) - 1.0;
-    }
-    return x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
+    float near = x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
+    float far = exp(x) - 1.0;
+    return abs(x) > 0.4 ? far : near;
 }
 
 vec3 lf_expm1(vec3 x) {
@@ -95,13 +93,12 @@ vec3 lf_expm1(vec3 x) {
 // Error function: a series in x^2 below 1, exp(-x^2) times a polynomial in 1 / (1 + x / 2) above (relative error 1.3e-7).
 float lf_erf(float x) {
     float a = abs(x);
-    if (a < 1.0) {
-        float u = x * x;
-        return x * (1.1283791 + u * (-0.3761232 + u * (0.11280131 + u * (-0.02670995 + u * (0.004916023 - u * 0.00056253962)))));
-    }
+    float u = x * x;
+    float near = x * (1.1283791 + u * (-0.3761232 + u * (0.11280131 + u * (-0.02670995 + u * (0.004916023 - u * 0.00056253962)))));
     float t = 1.0 / (1.0 + 0.5 * a);
     float p = 0.2814202 + t * (0.28951687 + t * (0.21660148 + t * (0.2249226 + t * (0.08896493 - t * 0.10282357))));
-    return sign(x) * (1.0 - t * p * exp(-a * a));
+    float far = sign(x) * (1.0 - t * p * exp(-u));
+    return a < 1.0 ? near : far;
 }
 
 vec3 lf_erf(vec3 x) {

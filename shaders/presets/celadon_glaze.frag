@@ -69,10 +69,10 @@ const Coat lf_glaze = Coat(
 const Interface lf_glaze_interface = Interface(
     1.52,           // n: index of the medium below, against air
     0.04,           // alpha: width of the facets, mean of the axes
-    0.008038056,    // tilt: turn of the mean facet towards a grazing direction
+    0.008038055,    // tilt: turn of the mean facet towards a grazing direction
     0.006316437,    // gain: part of the reflected light that a second facet lets in
     0.00042082055,  // lengthening: path added by the spread of refracted directions, in thicknesses
-    0.12518744      // drift: scale of the path added at grazing angles
+    0.12518741      // drift: scale of the path added at grazing angles
 );
 
 const Lambert lf_stoneware = Lambert(
@@ -96,10 +96,9 @@ const Haze lf_glaze_haze = Haze(
 
 // exp(x) - 1 without the cancellation near 0.
 float lf_expm1(float x) {
-    if (abs(x) > 0.4) {
-        return exp(x) - 1.0;
-    }
-    return x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
+    float near = x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
+    float far = exp(x) - 1.0;
+    return abs(x) > 0.4 ? far : near;
 }
 
 vec3 lf_expm1(vec3 x) {

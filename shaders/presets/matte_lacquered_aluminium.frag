@@ -62,18 +62,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.08523812,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.08523813,                                                  // tilt: turn of the mean facet towards a grazing direction
     0.23253432,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.08829562, 0.0692121, -0.0025319979, 0.046828188),    // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.03677714, -0.029231489, 0.019881316, 0.0019446835),  // passed_high: the other four, of higher powers
+    vec4(-0.08829561, 0.06921207, -0.0025319979, 0.046828307),   // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.03677714, -0.02923125, 0.019881316, 0.0019443259),   // passed_high: the other four, of higher powers
     vec4(1.1908898, -0.18565702, 0.023200512, 0.06637478),       // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.0222373, -0.021942139, 0.007124901, 0.0040454865),   // bend_high: 
-    vec4(0.46702373, -0.051299877, -0.09916976, 0.02692759),     // spread: width of a lobe seen through it
-    vec4(0.04108262, -0.027883053, -0.010092616, 0.00868845),    // spread_high: 
+    vec4(-0.022238255, -0.021943092, 0.0071253777, 0.00404644),  // bend_high: 
+    vec4(0.4670237, -0.05129976, -0.09916952, 0.02692759),       // spread: width of a lobe seen through it
+    vec4(0.041081667, -0.027884007, -0.010092378, 0.008688688),  // spread_high: 
     vec4(1.1454061, -0.22828844, 0.104338646, 0.04807949),       // path: mean path over that of the refracted direction
     vec4(-0.09155941, 0.036605835, 0.027258635, -0.02371645),    // path_high: 
-    vec4(0.3383599, -0.5951676, 0.37566137, 0.09792802),         // theta: scale of the path's distribution
-    vec4(-0.33254993, 0.12613428, 0.11371158, -0.062078923)      // theta_high: 
+    vec4(0.33835986, -0.5951677, 0.3756616, 0.09792897),         // theta: scale of the path's distribution
+    vec4(-0.33255088, 0.12613332, 0.11371158, -0.0620794)        // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -83,35 +83,34 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.26280716, 0.26119748, 0.2548187),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.054720975, -0.054050118, -0.051126525),     // c1: 
-    vec3(-0.078514606, -0.07869205, -0.079616204),      // c2: 
-    vec3(0.026235819, 0.025698721, 0.022903472),        // c3: 
-    vec3(-0.0127744675, -0.0106729865, -0.0038020015),  // c4: 
-    vec3(-0.09212148, -0.0908072, -0.08509052),         // c5: 
-    vec3(0.014962018, 0.01360485, 0.00939697),          // c6: 
-    vec3(0.05061668, 0.049736083, 0.04636085)           // c7: 
+    vec3(0.26280713, 0.26119748, 0.25481865),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.05472095, -0.0540501, -0.05112647),       // c1: 
+    vec3(-0.07851431, -0.078691885, -0.07961585),     // c2: 
+    vec3(0.02623564, 0.025698364, 0.022903055),       // c3: 
+    vec3(-0.012775242, -0.010673881, -0.0038027763),  // c4: 
+    vec3(-0.09212124, -0.09080756, -0.08509076),      // c5: 
+    vec3(0.014962614, 0.013605326, 0.009397566),      // c6: 
+    vec3(0.05061698, 0.049735785, 0.04636097)         // c7: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.7203759, 0.7106466, 0.7028715),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.13313264, -0.13201252, -0.12925413),   // c1: 
-    vec3(-0.08705068, -0.08799428, -0.09509188),   // c2: 
-    vec3(0.06703699, 0.06603837, 0.06161058),      // c3: 
-    vec3(-0.05822444, -0.052170515, -0.03435135),  // c4: 
-    vec3(-0.18883514, -0.18477988, -0.1746831),    // c5: 
-    vec3(0.023962617, 0.02065742, 0.010924339),    // c6: 
-    vec3(0.09213829, 0.08971715, 0.083723545)      // c7: 
+    vec3(0.72037584, 0.7106466, 0.7028715),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.13313222, -0.13201228, -0.12925407),   // c1: 
+    vec3(-0.087049484, -0.08799362, -0.09509131),  // c2: 
+    vec3(0.0670346, 0.06603694, 0.06160927),       // c3: 
+    vec3(-0.05822754, -0.05217135, -0.034353375),  // c4: 
+    vec3(-0.18883038, -0.18477607, -0.17468143),   // c5: 
+    vec3(0.02396524, 0.020658493, 0.010925889),    // c6: 
+    vec3(0.09213543, 0.089714766, 0.08372331)      // c7: 
 );
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
     float s = x / (2.0 + x);
     float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float far = log(1.0 + x);
+    return abs(x) > 0.3 ? far : near;
 }
 
 vec3 lf_log1p(vec3 x) {

@@ -129,12 +129,11 @@ const float lf_row2[6] = float[6](0.085662246, 0.18038079, 0.23395696, 0.2339569
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
     float s = x / (2.0 + x);
     float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float far = log(1.0 + x);
+    return abs(x) > 0.3 ? far : near;
 }
 
 vec3 lf_log1p(vec3 x) {
@@ -143,10 +142,9 @@ vec3 lf_log1p(vec3 x) {
 
 // exp(x) - 1 without the cancellation near 0.
 float lf_expm1(float x) {
-    if (abs(x) > 0.4) {
-        return exp(x) - 1.0;
-    }
-    return x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
+    float near = x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
+    float far = exp(x) - 1.0;
+    return abs(x) > 0.4 ? far : near;
 }
 
 vec3 lf_expm1(vec3 x) {

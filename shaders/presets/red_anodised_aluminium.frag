@@ -62,18 +62,18 @@ const Coat lf_oxide = Coat(
 );
 
 const Interface lf_oxide_interface = Interface(
-    0.046419468,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.046419457,                                                // tilt: turn of the mean facet towards a grazing direction
     0.10031511,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.03934908, 0.026510041, 0.032650657, -0.022436418),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.03934908, 0.026510041, 0.032650657, -0.022436477),  // passed: energy that passes, beyond the closed form: four coefficients
     vec4(-0.0328139, 0.028090157, 0.009836316, -0.011298083),   // passed_high: the other four, of higher powers
-    vec4(1.0975682, -0.15713176, 0.12942672, -0.04542494),      // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.057476044, 0.07574177, 0.00493145, -0.026345253),   // bend_high: 
-    vec4(0.66335785, -0.2969888, 0.117569864, -0.015427589),    // spread: width of a lobe seen through it
-    vec4(-0.1550864, 0.123889685, 0.053566456, -0.060359955),   // spread_high: 
-    vec4(1.0968367, -0.1920546, 0.17082345, -0.050065517),      // path: mean path over that of the refracted direction
-    vec4(-0.11193919, 0.12059212, 0.024900675, -0.049715042),   // path_high: 
-    vec4(0.23706682, -0.47861528, 0.46576566, -0.08105123),     // theta: scale of the path's distribution
-    vec4(-0.3500735, 0.15206563, 0.12560435, -0.006695181)      // theta_high: 
+    vec4(1.0975682, -0.15713224, 0.12942672, -0.04542494),      // bend: sine of the refracted light over that at a smooth interface
+    vec4(-0.057476997, 0.07574177, 0.00493145, -0.026343346),   // bend_high: 
+    vec4(0.6633578, -0.2969889, 0.117569864, -0.015428543),     // spread: width of a lobe seen through it
+    vec4(-0.15508735, 0.123889685, 0.053566456, -0.060361385),  // spread_high: 
+    vec4(1.0968367, -0.19205412, 0.17082345, -0.050070286),     // path: mean path over that of the refracted direction
+    vec4(-0.11193919, 0.120594025, 0.024900675, -0.04971552),   // path_high: 
+    vec4(0.23706682, -0.47861528, 0.46576566, -0.08105126),     // theta: scale of the path's distribution
+    vec4(-0.3500735, 0.1520657, 0.12560432, -0.0066952407)      // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -83,35 +83,34 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.22808346, 0.009596711, 0.014133657),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0155808255, 0.00071767974, 0.000878633),    // c1: 
-    vec3(-0.01060608, -0.00023955666, -0.00040572975),  // c2: 
-    vec3(0.0019189715, 0.00060902163, 0.0007808581),    // c3: 
-    vec3(-0.030874193, -0.0011516213, -0.0017442219),   // c4: 
-    vec3(-0.014983296, -0.0011393949, -0.0015514344),   // c5: 
-    vec3(0.015455008, 0.00066000037, 0.00097637624),    // c6: 
-    vec3(0.006897807, 0.0004430376, 0.0005889088)       // c7: 
+    vec3(0.22808345, 0.00959671, 0.0141336555),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.015580889, 0.0007176767, 0.0008786316),      // c1: 
+    vec3(-0.010605857, -0.00023954362, -0.00040569622),  // c2: 
+    vec3(0.0019199848, 0.0006090589, 0.00078089535),     // c3: 
+    vec3(-0.030874908, -0.0011516549, -0.0017442964),    // c4: 
+    vec3(-0.014984965, -0.0011394992, -0.0015514791),    // c5: 
+    vec3(0.015455246, 0.00066001713, 0.00097642094),     // c6: 
+    vec3(0.006898761, 0.00044308603, 0.0005889237)       // c7: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.69990736, 0.2210425, 0.25068143),             // c0: coefficients of the powers of the curves' argument
-    vec3(-0.046449438, -0.0019116029, -0.0037898347),    // c1: 
-    vec3(-0.03525412, -0.009733751, -0.012095541),       // c2: 
-    vec3(-0.019190788, -0.011288643, -0.012324452),      // c3: 
-    vec3(-0.019809961, -0.00843066, -0.008526802),       // c4: 
-    vec3(-0.021903515, -0.00021016598, -0.00032937527),  // c5: 
-    vec3(0.0047801733, -0.00030058622, -9.256601e-05),   // c6: 
-    vec3(0.014693499, -0.0007995367, -0.00043606758)     // c7: 
+    vec3(0.6999073, 0.22104251, 0.25068143),            // c0: coefficients of the powers of the curves' argument
+    vec3(-0.046449438, -0.0019115582, -0.0037898049),   // c1: 
+    vec3(-0.035253882, -0.009733915, -0.01209563),      // c2: 
+    vec3(-0.019190788, -0.011289179, -0.012324929),     // c3: 
+    vec3(-0.019809484, -0.0084306, -0.00852716),        // c4: 
+    vec3(-0.021904469, -0.00021016598, -0.0003284216),  // c5: 
+    vec3(0.004779458, -0.00030064583, -9.268522e-05),   // c6: 
+    vec3(0.014694452, -0.00079989433, -0.00043654442)   // c7: 
 );
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
     float s = x / (2.0 + x);
     float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float far = log(1.0 + x);
+    return abs(x) > 0.3 ? far : near;
 }
 
 vec3 lf_log1p(vec3 x) {

@@ -48,14 +48,14 @@ const Coat lf_urushi = Coat(
 );
 
 const Interface lf_urushi_interface = Interface(
-    0.008038056,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.008038055,                                                 // tilt: turn of the mean facet towards a grazing direction
     0.006316437,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.008072356, 0.01948674, -0.020731423, 0.024424378),   // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.03145449, 0.00013683946, 0.03702873, -0.021245457),  // passed_high: the other four, of higher powers
+    vec4(-0.008072356, 0.019486737, -0.020731423, 0.024424378),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec4(-0.03145446, 0.00013677985, 0.03702873, -0.021245457),  // passed_high: the other four, of higher powers
     vec4(1.0053927, -0.012037039, 0.013071418, -0.00825429),     // bend: sine of the refracted light over that at a smooth interface
     vec4(0.016440153, -0.026238441, 0.009810686, 0.0027136803),  // bend_high: 
-    vec4(0.63280284, -0.29555434, -0.024729937, 0.11218488),     // spread: width of a lobe seen through it
-    vec4(0.4771948, -0.8441887, 0.026913643, 0.3005638),         // spread_high: 
+    vec4(0.63280284, -0.29555434, -0.024730414, 0.11218488),     // spread: width of a lobe seen through it
+    vec4(0.47719383, -0.84418964, 0.026913643, 0.3005638),       // spread_high: 
     vec4(1.010907, -0.028521657, 0.02203238, -0.013605595),      // path: mean path over that of the refracted direction
     vec4(0.102348804, -0.12650013, -0.030620098, 0.064911366),   // path_high: 
     vec4(0.020297723, -0.06835176, 0.08423227, 0.07202018),      // theta: scale of the path's distribution
@@ -70,12 +70,11 @@ const vec3 lf_cinnabar_returned = vec3(0.4255121, 0.1857792, 0.06779367);
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
     float s = x / (2.0 + x);
     float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float far = log(1.0 + x);
+    return abs(x) > 0.3 ? far : near;
 }
 
 vec3 lf_log1p(vec3 x) {

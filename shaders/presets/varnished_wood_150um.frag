@@ -72,12 +72,11 @@ const vec3 lf_wood_returned = vec3(0.34061053, 0.17423677, 0.03931531);
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
-    if (abs(x) > 0.3) {
-        return log(1.0 + x);
-    }
     float s = x / (2.0 + x);
     float u = s * s;
-    return 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
+    float far = log(1.0 + x);
+    return abs(x) > 0.3 ? far : near;
 }
 
 vec3 lf_log1p(vec3 x) {

@@ -32,11 +32,16 @@ class Shipped:
     path: Path
     """The JSON document. Beside it lie the printed shader, `.frag`, and its picture, `.png`."""
 
+    @property
+    def picture(self) -> str:
+        """The picture beside the document, as HTML that holds it."""
+        content = base64.b64encode(self.path.with_suffix(".png").read_bytes()).decode()
+        return f'<img alt="" src="data:image/png;base64,{content}">'
+
     def _repr_html_(self) -> str:
         """For notebooks: its picture, and what it says of itself."""
-        picture = base64.b64encode(self.path.with_suffix(".png").read_bytes()).decode()
         words = "<br>".join(escape(line) for line in (self.description, self.structure, self.source))
-        return f'<p><b>{escape(self.name)}</b><br><img alt="" src="data:image/png;base64,{picture}"><br>{words}</p>'
+        return f"<p><b>{escape(self.name)}</b><br>{self.picture}<br>{words}</p>"
 
 
 def shipped_presets(word: str = "") -> list[Shipped]:

@@ -1,6 +1,6 @@
 """Presets as a page of live previews: each drawn by the shader that lies beside it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from itertools import groupby
 
@@ -26,9 +26,11 @@ def for_web(text: str) -> str:
     return text.replace(HEADERS["glsl330"], HEADERS["essl300"], 1)
 
 
-def _tiles(members) -> str:
+def _tiles(members: Iterable[Shipped]) -> str:
+    """Each with its picture, which stands there until it is drawn live."""
     return "".join(
-        f'<div class="tile" data-tile="{escape(preset.name)}"><div><h3>{escape(preset.name)}</h3><p>{escape(preset.description)}</p>'
+        f'<div class="tile" data-tile="{escape(preset.name)}"><div class="picture">{preset.picture}</div>'
+        f'<div class="about"><h3>{escape(preset.name)}</h3><p>{escape(preset.description)}</p>'
         f'<p class="soft">{escape(preset.structure)}</p></div></div>'
         for preset in members
     )

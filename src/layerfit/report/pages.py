@@ -13,7 +13,7 @@ from string import Template
 from typing import Any
 
 FOLDER = Path(__file__).parent / "page"
-VIEWER = ("packed.js", "program.js", "shapes.js", "renderer.js", "view.js", "controls.js")
+VIEWER = ("packed.js", "program.js", "shapes.js", "renderer.js", "view.js", "run.js", "controls.js")
 SCRIPTS = (*VIEWER, "compare.js", "gallery.js", "page.js")
 
 

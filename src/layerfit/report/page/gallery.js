@@ -1,4 +1,5 @@
-// Many materials at once, drawn when they are in sight. They are turned and lit together, so that they can be compared.
+// Many materials at once, turned and lit together, so that they can be compared. Each is a picture first, and is drawn live where it is in
+// sight: on a fast machine at once, on any other when it is pointed at, has the focus, or is turned. The first one tells which it is.
 
 const TILE_PASSES = 160;
 
@@ -7,12 +8,14 @@ function gallery(place, renderer, fragments) {
   const light = { yaw: -0.65, pitch: 0.6 };
   const views = Array.from(place.querySelectorAll("[data-tile]"), (tile) => {
     const canvas = element("canvas", { tabIndex: 0, role: "img", "aria-label": `${tile.dataset.tile}: drag or arrow keys turn all, with Shift the light` });
-    tile.prepend(canvas);
+    tile.firstElementChild.append(canvas);
     const view = new View(renderer, canvas, fragments[tile.dataset.tile], []);
-    Object.assign(view, { orbit, light, limit: TILE_PASSES });
+    Object.assign(view, { orbit, light, limit: TILE_PASSES, wanted: false, ondrawn: () => tile.classList.add("live") });
+    for (const event of ["pointerenter", "focus"]) canvas.addEventListener(event, () => { view.wanted = true; });
     return view;
   });
-  const all = (changes) => views.forEach((view) => view.change(changes));
+  views[0].wanted = true;
+  const all = (changes) => views.forEach((view) => view.change({ ...changes, wanted: true }));
   for (const view of views) turned(view.canvas, (dx, dy, shift) => {
     if (shift) turn(light, dx / 100, -dy / 100);
     else turn(orbit, -dx / 100, dy / 100);

@@ -81,26 +81,51 @@ class Renderer {
     this.add = this.link(SCREEN, ADD);
     this.show = this.link(SCREEN, SHOW);
     this.nothing = gl.createVertexArray();
+    this.asked = null;
+    this.parallel = gl.getExtension("KHR_parallel_shader_compile");
   }
 
   get lost() {
     return this.gl.isContextLost();
   }
 
+  // Marks the end of what was asked of the driver; it is `busy` until that is done.
+  mark() {
+    this.asked = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.gl.flush();
+  }
+
+  get busy() {
+    const gl = this.gl;
+    if (!this.asked) return false;
+    if (gl.getSyncParameter(this.asked, gl.SYNC_STATUS) === gl.UNSIGNALED) return true;
+    gl.deleteSync(this.asked);
+    this.asked = null;
+    return false;
+  }
+
+  // A program, which a driver may compile beside other work: it is used when it is `ready`, which throws what the driver has against it.
   link(vertex, fragment) {
     const gl = this.gl;
     const program = gl.createProgram();
-    for (const [type, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shaders = [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]].map(([type, text]) => {
       const shader = gl.createShader(type);
       gl.shaderSource(shader, text);
       gl.compileShader(shader);
-      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !this.lost) throw new Error(gl.getShaderInfoLog(shader));
       gl.attachShader(program, shader);
-    }
+      return shader;
+    });
     gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !this.lost) throw new Error(gl.getProgramInfoLog(program));
     const places = {};
-    return { program, at: (name) => (places[name] ??= gl.getUniformLocation(program, name)) };
+    let linked = false;
+    const ready = () => {
+      if (linked || this.lost) return linked;
+      if (this.parallel && !gl.getProgramParameter(program, this.parallel.COMPLETION_STATUS_KHR)) return false;
+      linked = gl.getProgramParameter(program, gl.LINK_STATUS);
+      if (!linked && !this.lost) throw new Error([...shaders.map((s) => gl.getShaderInfoLog(s)), gl.getProgramInfoLog(program)].filter(Boolean).join("\n"));
+      return linked;
+    };
+    return { program, ready, at: (name) => (places[name] ??= gl.getUniformLocation(program, name)) };
   }
 
   // A fragment shader as `layerfit export --target essl300` prints it, for so many lights.
@@ -154,12 +179,14 @@ class Renderer {
     if (target.render) this.gl.deleteRenderbuffer(target.render);
   }
 
-  // One pass: a shape in a material, seen by a camera under lights [[x, y, z, w], [r, g, b]].
-  draw(target, material, values, shape, camera, lights) {
+  // Rows of one pass: a shape in a material, seen by a camera under lights [[x, y, z, w], [r, g, b]].
+  draw(target, material, values, shape, camera, lights, row = 0, rows = target.height) {
     const gl = this.gl;
     const { program, at } = material;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.buffer);
     gl.viewport(0, 0, target.width, target.height);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(0, row, target.width, rows);
     gl.enable(gl.DEPTH_TEST);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
@@ -179,6 +206,7 @@ class Renderer {
     gl.bindVertexArray(array);
     gl.drawElements(mode, count, gl.UNSIGNED_INT, 0);
     gl.disable(gl.DEPTH_TEST);
+    gl.disable(gl.SCISSOR_TEST);
   }
 
   screen({ program, at }, textures, numbers) {

@@ -8,7 +8,7 @@ const STUDIO = [
 ];
 const KEY = { size: 0.035, irradiance: 2.2 };
 const PASSES = 768;
-const FRAME_MS = 40;
+const COARSEST = 0.25;  // of the pixels along a side
 
 class View {
   constructor(renderer, canvas, fragment, values) {
@@ -17,6 +17,8 @@ class View {
     this.context = canvas.getContext("2d");
     this.fragment = fragment;
     this.material = null;  // compiled when it is first drawn
+    this.warm = false;  // whether something was: some drivers compile then
+    this.failed = false;
     this.age = renderer.age;
     this.values = values;
     this.shape = "sphere";
@@ -26,29 +28,40 @@ class View {
     this.exposure = 0;
     this.tone = 0;
     this.visible = true;
+    this.wanted = true;  // live on any machine, not on fast ones alone
     this.passes = 0;
+    this.row = 0;  // of the pass that is being drawn
     this.limit = PASSES;
-    this.atOnce = 1;
     this.fineness = 1;
     this.onchange = () => {};
+    this.ondrawn = () => {};
   }
 
   // Begin anew: something has changed.
   change(changes = {}) {
     Object.assign(this, changes);
-    this.passes = 0;
+    this.restart();
     this.onchange();
+  }
+
+  restart() {
+    this.passes = 0;
+    this.row = 0;
   }
 
   resize() {
     const ratio = this.fineness * Math.min(window.devicePixelRatio || 1, 2);
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map((x) => Math.max(1, Math.round(x * ratio)));
-    if (this.canvas.width === width && this.canvas.height === height && this.pass) return;
+    if (this.pass?.width === width && this.pass.height === height) return;
     this.release();
-    [this.canvas.width, this.canvas.height] = [width, height];
     this.pass = this.renderer.target(width, height, true);
     this.totals = [0, 1].map(() => this.renderer.target(width, height));
-    this.passes = 0;
+    this.restart();
+  }
+
+  // Fewer pixels, where those of a pass are more than a machine draws in a good while.
+  coarsen(pixels) {
+    if (this.pass && this.passes < 3 && this.pass.width * this.pass.height > pixels) this.fineness = Math.max(this.fineness / 2, COARSEST);
   }
 
   release() {
@@ -81,24 +94,43 @@ class View {
   // Forgets what a driver that stopped has taken along.
   renew() {
     if (this.age === this.renderer.age) return;
-    Object.assign(this, { age: this.renderer.age, material: null, pass: null, passes: 0 });
+    Object.assign(this, { age: this.renderer.age, material: null, warm: false, pass: null });
+    this.restart();
   }
 
-  frame() {
-    this.material ??= this.renderer.material(this.fragment);
+  get still() {
+    return this.pass && this.passes >= this.limit;
+  }
+
+  // Draws on: as many rows of its pass as have so many pixels, and the sum where they are the last. Returns how many pixels these were.
+  advance(pixels) {
     this.resize();
-    const { width, height } = this.canvas;
+    const { width, height } = this.pass;
     const { yaw, pitch, distance } = this.orbit;
-    for (let n = 0; n < this.atOnce && this.passes < this.limit; n++) {
-      const k = this.passes;
-      const shift = k ? [((k * 0.618034) % 1) - 0.5, ((k * 0.754878) % 1) - 0.5] : [0, 0];
-      const seen = camera(yaw, pitch, distance, width, height, shift);
-      this.renderer.draw(this.pass, this.material, this.values, this.shape, seen, this.lights(k));
-      if (k === 0) this.clear(this.totals[0]);
-      this.renderer.sum(this.totals[(k + 1) % 2], this.totals[k % 2], this.pass);
-      this.passes++;
-    }
-    this.present();
+    const k = this.passes;
+    const shift = k ? [((k * 0.618034) % 1) - 0.5, ((k * 0.754878) % 1) - 0.5] : [0, 0];
+    const seen = camera(yaw, pitch, distance, width, height, shift);
+    const rows = Math.min(Math.max(Math.floor(pixels / width), 1), height - this.row);
+    this.renderer.draw(this.pass, this.material, this.values, this.shape, seen, this.lights(k), this.row, rows);
+    this.row += rows;
+    if (this.row === height) this.add();
+    return rows * width;
+  }
+
+  // A pass that is whole, to those before it.
+  add() {
+    const k = this.passes;
+    if (k === 0) this.clear(this.totals[0]);
+    this.renderer.sum(this.totals[(k + 1) % 2], this.totals[k % 2], this.pass);
+    this.passes++;
+    this.row = 0;
+  }
+
+  // Says why there is no picture.
+  fail(error) {
+    this.failed = true;
+    this.canvas.after(element("p", { className: "said", textContent: `There is no live view here: ${error.message}` }));
+    console.error(error);
   }
 
   clear(target) {
@@ -107,7 +139,11 @@ class View {
   }
 
   present() {
-    if (this.pass) this.renderer.present(this.totals[this.passes % 2], this.passes, 2 ** this.exposure, this.tone, this.context);
+    if (!this.pass || !this.passes) return;
+    const { width, height } = this.pass;
+    if (this.canvas.width !== width || this.canvas.height !== height) [this.canvas.width, this.canvas.height] = [width, height];
+    this.renderer.present(this.totals[this.passes % 2], this.passes, 2 ** this.exposure, this.tone, this.context);
+    this.ondrawn();
   }
 
   // One pass of given lights at a given size, as linear numbers: what a test compares with another driver.
@@ -121,41 +157,4 @@ class View {
     this.renderer.release(target);
     return { pixels, eye: seen.eye, matrix: seen.matrix };
   }
-}
-
-// Draws those views of a page that are in sight and not yet still; more passes a frame where the machine keeps up. Returns what ends it.
-function run(views) {
-  const seen = new IntersectionObserver((entries) => {
-    for (const { target, isIntersecting } of entries) {
-      const view = views.find(({ canvas }) => canvas === target);
-      view.visible = isIntersecting;
-      if (!isIntersecting) view.release();
-    }
-  }, { rootMargin: "100px" });
-  views.forEach(({ canvas }) => seen.observe(canvas));
-  const anew = () => views.forEach((view) => view.change());
-  window.addEventListener("resize", anew);
-  let before = 0;
-  let next = 0;
-  const frame = (now) => {
-    const waited = now - before;
-    before = now;
-    views.forEach((view) => view.renew());
-    const due = views.filter((view) => view.visible && !view.renderer.lost && (view.passes < view.limit || !view.pass));
-    due.sort((a, b) => a.passes - b.passes);
-    for (const view of due) {
-      if (performance.now() - now > FRAME_MS) break;  // compiling shaders takes long: one or a few a frame
-      view.atOnce = Math.min(Math.max(waited < 24 ? view.atOnce + 1 : view.atOnce >> 1, 1), 8);
-      if (waited > 250 && view.passes > 0 && view.passes < 3) view.fineness = Math.max(view.fineness / 2, 0.25);  // no GPU
-      view.frame();
-    }
-    next = requestAnimationFrame(frame);
-  };
-  next = requestAnimationFrame(frame);
-  return () => {
-    cancelAnimationFrame(next);
-    seen.disconnect();
-    window.removeEventListener("resize", anew);
-    views.forEach((view) => view.dispose());
-  };
 }
