@@ -18,7 +18,7 @@ in vec3 v_normal;
 //@ if tangent
 in vec3 v_tangent;   // along which widths and patterns are measured
 //@ end
-//@ if uv
+//@ if at_uv
 in vec2 v_uv;        // texture coordinates
 //@ end
 out vec4 color;
@@ -29,16 +29,32 @@ uniform vec3 u_up;  // where the sky is, a unit vector
 //@ end
 uniform vec4 u_light[LF_LIGHTS];      // w = 0: direction to a distant light; w = 1: position of a point light
 uniform vec3 u_light_rgb[LF_LIGHTS];  // its irradiance; its intensity per steradian
+//@ if maps
+//@ textures
+//@ end
+//@ if tilt
+uniform sampler2D u_tilt;  // slopes of the normal, along the tangent and across it
+//@ end
 
 //@ lights
 
+//@ if tilt
+//@ tilted
+
+//@ end
 //@ output
 
 void main() {
     vec3 n = normalize(v_normal);
+//@ if tilt
+    n = lf_tilted(n@ALONG@, texture(u_tilt, v_uv).rg);
+//@ end
     vec3 v = normalize(u_eye - v_position);
 //@ if uv
     vec2 uv = v_uv;
+//@ end
+//@ if maps
+//@ texels
 //@ end
 //@ if distance
     float distance = length(u_eye - v_position);  // in the unit of the space above

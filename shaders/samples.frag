@@ -12,6 +12,9 @@ in float v_distance;
 //@ if sky
 in float v_sky;
 //@ end
+//@ if maps
+//@ given
+//@ end
 out vec4 color;
 
 void main() {
@@ -23,6 +26,9 @@ void main() {
 //@ end
 //@ if sky
     float sky = v_sky;
+//@ end
+//@ if maps
+//@ taken
 //@ end
 //@ if cosines
     vec2 lean = v_wi.xy + v_wo.xy;

@@ -47,6 +47,7 @@ TOP = [
     {"report"},
     {"tabulate", "drawings", "job", "truth", "structures", "stability", "cache", "view", "doctor", "plot"},
     {"batch", "tradeoffs", "specialising", "notebook"},
+    {"maps"},
     {"demo"},
     {""},
     {"cli"},

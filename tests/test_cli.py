@@ -28,6 +28,7 @@ COMMANDS = (
     "structures",
     "batch",
     "advise",
+    "map",
     "render",
     "eval",
     "export",

@@ -19,7 +19,7 @@ import gallery
 
 import layerfit as lf
 from layerfit._fields import Param, params
-from layerfit.capture.scene import FitRequest
+from layerfit.capture.scene import FitRequest, MapRequest
 from layerfit.layers import LAYERS
 from layerfit.preset import MODELS, preset_of
 from layerfit.surfaces import BASES
@@ -127,6 +127,7 @@ TABLES: dict[str, Callable[[], str]] = {
     **{name: lambda name=name, cls=cls: layer(name, cls) for name, cls in (LAYERS | BASES).items()},
     **{name: lambda cls=cls: options(cls) for name, cls in MODELS.items()},
     "fit": lambda: options(FitRequest),
+    "map": lambda: options(MapRequest),
 }
 
 

@@ -12,6 +12,7 @@
 - Before a fit: advise gives an Advice, what a capture determines and which further image would tell most.
 - Fitting: fit gives a FitResult, parameters its values with sigmas; fit_scene does what `layerfit fit` does; image_error compares pictures.
 - Many fits: fit_batch does what `layerfit batch` does, and gives a Batch.
+- Maps: fit_map does what `layerfit map` does, a fit for every texel, and gives a MapFit.
 - Structures: choose_structure tries candidates and gives a StructureChoice; structures_of does what `layerfit structures` does.
 - Rendering: predict gives pixels, radiance the same traced, brdf the plain function; Place is where on the surface.
 - Shaders: print_material gives a Shader; shade_samples draws it; check_pairs and check_image compare it with JAX and give a Parity.

@@ -29,6 +29,8 @@ from .layers import (
     Patina as Patina,
     Polish as Polish,
 )
+from .maps import fit_map as fit_map
+from .maps.result import MapFit as MapFit
 from .notebook import live as live
 from .optics.lazanyi import Lazanyi as Lazanyi, fit_lazanyi as fit_lazanyi
 from .optics.metals import Metal as Metal, metal as metal

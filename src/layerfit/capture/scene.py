@@ -202,6 +202,19 @@ class FitRequest:
 
 
 @dataclasses.dataclass(frozen=True)
+class MapRequest:
+    """What the scene file asks of a map."""
+
+    free: tuple[str, ...] = ()
+    """Parameters that every texel has for itself."""
+    smooth: float | Mapping[str, float] | None = None
+    """By how much neighbours differ, one standard deviation in the coordinates of the fit; None where they know nothing of one another."""
+    size: int | None = None
+    """Texels on a side, over texture coordinates; None for a map of pixels."""
+    starts: int = 4
+
+
+@dataclasses.dataclass(frozen=True)
 class Scene:
     """A scene file, read and checked."""
 
@@ -209,3 +222,4 @@ class Scene:
     references: tuple[Reference | MeasuredReference, ...]
     start: Stack
     fit: FitRequest
+    map: MapRequest = MapRequest()

@@ -26,6 +26,7 @@ from .scene import (
     EnvironmentMap,
     FitRequest,
     Light,
+    MapRequest,
     MeasuredReference,
     Point,
     Rectangle,
@@ -38,6 +39,8 @@ from .values import direction, layout, need, number, one_of, positive, rgb, text
 
 MOST_STARTS = 1000
 """Of a fit: each takes seconds."""
+MOST_TEXELS = 4096
+"""On a side of a map: memory holds what was seen of all of them."""
 
 
 def read_scene(path: str | Path, start: Stack | None = None) -> Scene:
@@ -45,7 +48,7 @@ def read_scene(path: str | Path, start: Stack | None = None) -> Scene:
     path = Path(path)
     document = read_document(path)
     where = str(path)
-    check_keys(document, ("reference", "geometry", "camera", "light", "material", "fit"), where)
+    check_keys(document, ("reference", "geometry", "camera", "light", "material", "fit", "map"), where)
     entries = document.get("reference")
     if entries is None:
         raise InputError(f'{where}: there is no [reference]; give one, with exr = "NAME.exr" or brdf = "NAME.bsdf"')
@@ -55,6 +58,7 @@ def read_scene(path: str | Path, start: Stack | None = None) -> Scene:
         tuple(r for k, entry in enumerate(entries) for r in _references(entry, document, path, f"{where}: reference[{k}]")),
         start if start is not None and "material" not in document else _start(document.get("material"), path),
         _fit(document.get("fit", {}), f"{where}: fit"),
+        _map(document.get("map", {}), f"{where}: map"),
     )
 
 
@@ -134,9 +138,7 @@ def _fit(table: Any, where: str) -> FitRequest:
         values["metric"] = values.pop("weights")
     for key in ("free", "also", "each"):
         if key in values:
-            if not isinstance(values[key], list) or not all(isinstance(v, str) for v in values[key]):
-                raise InputError(f'{where}.{key}: should be a list of parameters such as "coat.alpha"')
-            values[key] = tuple(values[key])
+            values[key] = _names(values[key], f"{where}.{key}")
     for key, known in (("loss", LOSSES), ("metric", METRICS)):
         if values.get(key, known[0]) not in known:
             raise InputError(
@@ -145,12 +147,35 @@ def _fit(table: Any, where: str) -> FitRequest:
     if "min_cosine" in values and not 0.0 <= number(values["min_cosine"], f"{where}.min_cosine") < 1.0:
         raise InputError(f"{where}.min_cosine = {values['min_cosine']!r}: should be from 0 to below 1")
     for key, (least, most) in (("starts", (1, MOST_STARTS)), ("seed", (0, 2**63 - 1))):
-        value = values.get(key, least)
-        if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-            raise InputError(f"{where}.{key} = {value!r}: should be a whole number from {least} to {most}")
+        _check_whole(values.get(key, least), least, most, f"{where}.{key}")
     if not isinstance(values.get("fixed", {}), Mapping):
         raise InputError(f"{where}.fixed = {values['fixed']!r}: should be a table of parameters and their values")
     return FitRequest(**values)
+
+
+def _map(table: Any, where: str) -> MapRequest:
+    check_keys(table, [f.name for f in dataclasses.fields(MapRequest)], where)
+    values = dict(table)
+    if "free" in values:
+        values["free"] = _names(values["free"], f"{where}.free")
+    for key, most in (("size", MOST_TEXELS), ("starts", MOST_STARTS)):
+        if key in values:
+            _check_whole(values[key], 1, most, f"{where}.{key}")
+    smooth = values.get("smooth", {})
+    for name, value in (smooth if isinstance(smooth, Mapping) else {"": smooth}).items():
+        positive(value, f"{where}.smooth.{name}".rstrip("."))
+    return MapRequest(**values)
+
+
+def _names(value: Any, where: str) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
+        raise InputError(f'{where}: should be a list of parameters such as "coat.alpha"')
+    return tuple(value)
+
+
+def _check_whole(value: Any, least: int, most: int, where: str) -> None:
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+        raise InputError(f"{where} = {value!r}: should be a whole number from {least} to {most}")
 
 
 def _camera(table: Any, where: str) -> Camera:

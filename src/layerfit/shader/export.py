@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, Literal
 
@@ -14,18 +15,23 @@ from .._chunk import CHUNKS, where
 from .._data import shaders
 from .._fields import params
 from .._place import TANGENT, Place, needs_tangent
+from ..documents import nearest
 from ..errors import InputError
 from ..forms import weathering
 from ..forms.precise import BAKED, Precise, held
 from ..optics.lazanyi import fit_lazanyi
 from ..preset import left_out, model_name
 from ..stack import PREPARED, Stack, at, evaluate, prepared
+from .glsl import literal
 from .printer import PREFIX, Printer, named_leaves
 
 SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ()), "sky": ("float", ())}
 """What a material may read of a place: its type in the shader and in JAX."""
 
 COSINES = "cosines"
+
+MAPS, TILT, AT_UV = "maps", "tilt", "at_uv"
+"""What the example entry point does where values come from textures: reads them, tilts the normal, and is given texture coordinates."""
 
 HEADERS = {
     "glsl330": "#version 330 core",
@@ -44,11 +50,23 @@ class Shader:
     """Structs, constants and functions, up to `vec3 lf_brdf(...)`; complete without anything else."""
     uniforms: dict[str, Any]
     """Values of the uniforms, by name; empty where values are constants."""
+    maps: tuple[str, ...] = ()
+    """Parameters that differ from place to place, such as "coat.thickness_um", and "tilt" for the slopes of the normal."""
+    tangent: bool = False
+    """Whether the slopes of the normal are along a tangent that is given, and across it."""
 
     @property
     def asks(self) -> frozenset[str]:
         """What the BRDF asks for beside a normal and two directions: a tangent, texture coordinates, a distance, a share of the sky."""
-        return asks(self.stack)
+        told = {TANGENT} if self.tangent else set()
+        told |= {MAPS} if self.parameters else set()
+        told |= {TILT} if TILT in self.maps else set()
+        return asks(self.stack) | told | ({AT_UV} if self.maps or "uv" in self.stack.reads else set())
+
+    @property
+    def parameters(self) -> tuple[tuple[str, str, str], ...]:
+        """Type, name and meaning of what the BRDF is given of its maps."""
+        return map_parameters(self.stack, self.maps)
 
     def text(self, target: str = "glsl330", file: str = "material.frag") -> str:
         """The whole fragment shader: a template of `shaders/` with this material in its slots."""
@@ -58,8 +76,15 @@ class Shader:
             "material": self.functions,
             "lights": template("lights.glsl", self.asks),
             "output": template("output.glsl", self.asks),
+            "tilted": template("tilt.glsl", self.asks),
+            "textures": "".join(f"uniform sampler2D u_{name};  // {note}\n" for _, name, note in self.parameters),
+            "texels": "".join(
+                f"    {kind} {name} = texture(u_{name}, v_uv).{SWIZZLE[kind]};\n" for kind, name, _ in self.parameters
+            ),
+            "given": "".join(f"in {kind} v_{name};\n" for kind, name, _ in self.parameters),
+            "taken": "".join(f"    {kind} {name} = v_{name};\n" for kind, name, _ in self.parameters),
         }
-        text = template(file, self.asks)
+        text = template(file, self.asks, self.parameters)
         return re.sub(r"^//@ (\w+)$", lambda slot: slots[slot[1]].rstrip("\n"), text, flags=re.M)
 
     def _about(self) -> str:
@@ -82,6 +107,20 @@ class Shader:
             lines += ["Indices of refraction are relative to the layer above: its own index divides those in the preset."]
         lines += approximations(self.stack)
         return "\n".join(f"// {line}" for line in lines)
+
+
+SWIZZLE = {"float": "r", "vec3": "rgb"}
+"""What of a texel is the value of a parameter."""
+
+
+def map_parameters(stack: Stack, maps: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
+    """Type, name in the shader and meaning of the mapped parameters of layers, in the order of the layers."""
+    return tuple((kind, name, note) for _, name, kind, note in _live(stack) if name in {_flat(m) for m in maps})
+
+
+def _flat(name: str) -> str:
+    """A parameter's name as a shader can have it: `coat_thickness_um`."""
+    return name.replace(".", "_")
 
 
 def asks(stack: Stack) -> frozenset[str]:
@@ -109,13 +148,26 @@ def approximations(stack: Stack) -> list[str]:
     return lines
 
 
-def print_material(stack: Stack, name: str, uniforms: bool | Literal["prepared"] = False) -> Shader:
+def print_material(
+    stack: Stack,
+    name: str,
+    uniforms: bool | Literal["prepared"] = False,
+    *,
+    maps: Sequence[str] = (),
+    tangent: bool = False,
+) -> Shader:
     """Print a material: its values as constants, or as uniforms `u_LAYER_FIELD` from which the shader computes its constants.
 
     `uniforms="prepared"`: the constants themselves are uniforms, whose names they keep. The shader then costs what one with constants
     does, and its host computes them: `Shader.uniforms` has those of this material, `program.program` what gives those of another.
+
+    `maps` are parameters that differ from place to place, such as "coat.thickness_um": they become parameters of `lf_brdf`, and the example
+    entry point reads each from a texture `u_coat_thickness_um`; all others are constants. With "tilt" among them the entry point tilts the
+    normal by the slopes in the texture `u_tilt`, along a tangent that it is given (`tangent`), else in the frame that `lf_brdf` makes of the
+    normal alone. Raises `InputError` for a parameter that the material does not have, or that a shader cannot compute its constants from.
     """
     stack = stack.astype(jnp.float32)
+    _check_maps(stack, maps, uniforms)
     printer = Printer(CHUNKS)
     w = jnp.array([0.0, 0.0, 1.0], jnp.float32)
     inputs = [(w, "wi"), (w, "wo"), *((jnp.zeros(SIZES[name][1], jnp.float32), name) for name in stack.reads)]
@@ -130,22 +182,34 @@ def print_material(stack: Stack, name: str, uniforms: bool | Literal["prepared"]
         there = Place(**dict(zip(stack.reads, place, strict=True))) if place else None
         return jnp.broadcast_to(evaluate(stack.form, at(prepared, there), wi, wo), (3,))
 
-    if uniforms is True:
+    mapped = [name for _, name, _ in map_parameters(stack, maps)]
+    if uniforms is True or mapped:
         _check_live(stack)
         rows, leaves = _uniforms(stack), jax.tree.leaves(stack)
-        given = [row for row in rows if row]
-        declarations = "".join(f"uniform {kind} {name};  // {note}\n" for _, name, kind, note in given)
-        values = {name: np.asarray(leaf) for leaf, name, _, _ in given}
+        given = [row for row in rows if row and row[1] not in mapped]
+        prefix = "u_" if uniforms else PREFIX
+        if uniforms:
+            declarations = "".join(f"uniform {kind} u_{name};  // {note}\n" for _, name, kind, note in given)
+        else:
+            declarations = "".join(
+                f"const {kind} {PREFIX}{name} = {literal(leaf)};  // {note}\n" for leaf, name, kind, note in given
+            )
+        values = {f"u_{name}": np.asarray(leaf) for leaf, name, _, _ in given} if uniforms else {}
         structure = jax.tree.structure(stack)
         constants = _held(stack)
+        inputs += [(row[0], row[1]) for row in rows if row and row[1] in mapped]
 
         def local(*args: Any) -> Any:
-            free = iter(args[: -len(inputs)])
-            values = [next(free) if row else leaf for row, leaf in zip(rows, leaves, strict=True)]
+            free, there = iter(args[: len(given)]), iter(args[len(args) - len(mapped) :])
+            values = [
+                leaf if not row else next(there) if row[1] in mapped else next(free)
+                for row, leaf in zip(rows, leaves, strict=True)
+            ]
             live: Stack = jax.tree.unflatten(structure, values)
-            return shade(dataclasses.replace(live.prepare(), **constants), *args[-len(inputs) :])
+            made = dataclasses.replace(live.prepare(), **constants)
+            return shade(made, *args[len(given) : len(args) - len(mapped)])
 
-        outside = [(leaf, name) for leaf, name, _, _ in given]
+        outside = [(leaf, f"{prefix}{name}") for leaf, name, _, _ in given]
     else:
         with jax.enable_x64(False):
             made = jax.tree.map(np.asarray, prepared(stack))
@@ -164,10 +228,32 @@ def print_material(stack: Stack, name: str, uniforms: bool | Literal["prepared"]
 
     local.__doc__ = "BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine."
     printer.function(local, f"{PREFIX}{'shade' if cosines else 'evaluate'}", outside, inputs)
-    shader = Shader(name, stack, "", values)
-    frame = template("cosines.glsl" if cosines else "brdf.glsl", shader.asks)
+    shader = Shader(name, stack, "", values, tuple(maps), tangent)
+    frame = template("cosines.glsl" if cosines else "brdf.glsl", shader.asks, shader.parameters)
     functions = "\n".join(part for part in (printer.structs_text(), declarations, printer.functions_text(), frame) if part)
     return dataclasses.replace(shader, functions=functions)
+
+
+def _check_maps(stack: Stack, maps: Sequence[str], uniforms: Any) -> None:
+    layers = (*stack.layers, stack.base)
+    known = [f"{layer.name}.{field}" for layer in layers for field, _ in params(layer) if getattr(layer, field) is not None]
+    known.append(TILT)
+    for name in maps:
+        if name not in known:
+            raise InputError(
+                f"there is no parameter {name!r} to map{nearest(name, known)}. This material has {', '.join(known)}"
+            )
+        if name != TILT and _flat(name) not in {row[1] for row in _live(stack)}:
+            raise InputError(
+                f"{name} cannot come from a texture: the precise form looks up what follows from it once a material, which a shader cannot. "
+                'Give the material model = "corrected", whose shader computes it at every place'
+            )
+    if maps and uniforms:
+        raise InputError("a shader with maps has its other values as constants: leave uniforms out")
+    if maps and COSINES in asks(stack):
+        raise InputError(
+            "a compact material is made of curves, in which no parameter is left to map: print the material itself"
+        )
 
 
 def _check_live(stack: Stack) -> None:
@@ -225,8 +311,13 @@ def _held(stack: Stack) -> dict[str, Any]:
         return jax.tree.map(np.asarray, held(prepared(stack)))
 
 
+def _live(stack: Stack) -> list[tuple[Any, str, str, str]]:
+    """Every number of the material from which its shader can compute: (value, name, type, comment)."""
+    return [row for row in _uniforms(stack) if row]
+
+
 def _uniforms(stack: Stack) -> list[tuple[Any, str, str, str] | None]:
-    """Every number of the material as (value, uniform, type, comment), in the order of its leaves; None for what is baked."""
+    """Every number of the material as (value, name, type, comment), in the order of its leaves; None for what is baked."""
     rows: list[tuple[Any, str, str, str] | None] = []
     baked = stack.layers if isinstance(stack.form, Precise) else ()
     for layer in (*stack.layers, stack.base):
@@ -238,19 +329,21 @@ def _uniforms(stack: Stack) -> list[tuple[Any, str, str, str] | None]:
                 rows.append(None)
             else:
                 note = f"{spec.doc}, {spec.lower:g} to {spec.upper:g} {'' if spec.unit == '1' else spec.unit}".rstrip()
-                rows.append((value, f"u_{layer.name}_{field}", "vec3" if value.ndim else "float", note))
+                rows.append((value, f"{layer.name}_{field}", "vec3" if np.ndim(value) else "float", note))
     return rows
 
 
 @cache
-def template(file: str, asks: frozenset[str]) -> str:
+def template(file: str, asks: frozenset[str], maps: tuple[tuple[str, str, str], ...] = ()) -> str:
     """A file of `shaders/` with its conditional parts chosen, and what the material asks for in its lists of parameters."""
     text = (shaders() / file).read_text()
     names = [name for name in SIZES if name in asks]
+    place = [(SIZES[name][0], name) for name in names] + [(kind, name) for kind, name, _ in maps]
     lists = {
         "@FRAME@": f"vec3 n, {'vec3 t, ' if TANGENT in asks else ''}vec3 v, vec3 l@PLACE@",
-        "@PLACE@": "".join(f", {SIZES[name][0]} {name}" for name in names),
-        "@THERE@": "".join(f", {name}" for name in names),
+        "@ALONG@": ", v_tangent" if TANGENT in asks else "",
+        "@PLACE@": "".join(f", {kind} {name}" for kind, name in place),
+        "@THERE@": "".join(f", {name}" for _, name in place),
     }
 
     def choose(match: re.Match[str]) -> str:

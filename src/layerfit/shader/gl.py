@@ -88,11 +88,13 @@ def shade_points(
     fragment: str,
     attributes: Mapping[str, np.ndarray],
     uniforms: Mapping[str, object] | None = None,
+    textures: Mapping[str, np.ndarray] | None = None,
 ) -> np.ndarray:
     """Run a fragment shader once for each row of `attributes` and return what it wrote, (n, 3) float32.
 
     Each row is one pixel of its own, drawn as a point with the row as the shader's inputs: geometry from any source reaches the
-    shader as an engine's varyings would. An attribute of three axes (passes, n, k) makes as many passes, which are added up.
+    shader as an engine's varyings would. An attribute of three axes (passes, n, k) makes as many passes, which are added up. `textures` are
+    arrays (H, W, channels) by the names of their samplers, row 0 at the top (v = 1), read by linear filtering.
 
     Raises `MachineError` when a pixel was not drawn, or one that should have stayed empty was.
     """
@@ -109,6 +111,7 @@ def shade_points(
     target = float_target((width, height))
     buffers = {name: ctx.buffer(reserve=n * a.shape[-1] * 4) for name, a in used.items()}
     pixels = ctx.buffer(pixel.tobytes())
+    samplers = _bound(program, textures or {})
     content = [(pixels, "2f", "a_pixel")] + [(buffers[name], f"{a.shape[-1]}f", f"a_{name}") for name, a in used.items()]
     array = ctx.vertex_array(program, content)
     total = np.zeros((n, 3), np.float64)
@@ -125,9 +128,23 @@ def shade_points(
         if (error := ctx.error) != "GL_NO_ERROR":
             raise MachineError(f"the GL driver ({renderer()}) reports {error} after drawing")
     finally:
-        for resource in (array, pixels, *buffers.values(), program):
+        for resource in (array, pixels, *buffers.values(), *samplers, program):
             resource.release()
     return total.astype(np.float32)
+
+
+def _bound(program: moderngl.Program, textures: Mapping[str, np.ndarray]) -> list[moderngl.Texture]:
+    """Float textures in the units of their samplers; without mipmaps."""
+    made = []
+    for unit, (name, values) in enumerate(textures.items()):
+        height, width, channels = values.shape
+        rows = np.ascontiguousarray(values[::-1], "f4")  # GL counts rows from the bottom
+        texture = context().texture((width, height), channels, rows.tobytes(), dtype="f4", alignment=4)
+        texture.filter = moderngl.LINEAR, moderngl.LINEAR
+        texture.use(unit)
+        set_uniforms(program, {name: unit})
+        made.append(texture)
+    return made
 
 
 _targets: list[moderngl.Framebuffer] = []

@@ -1,7 +1,7 @@
 """Is the shader the material? The printed functions rendered in OpenGL, compared with JAX number by number."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,14 +59,24 @@ def compare(shader: np.ndarray, model: np.ndarray, floor: float, describe: Any =
     )
 
 
-def shade_samples(shader: Shader, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, place: Place | None = None) -> np.ndarray:
+def shade_samples(
+    shader: Shader,
+    wi: np.ndarray,
+    wo: np.ndarray,
+    weight: np.ndarray,
+    place: Place | None = None,
+    maps: Mapping[str, np.ndarray] | None = None,
+) -> np.ndarray:
     """Pixels (n, 3) that the printed functions make of samples: wi and weight (n, samples, 3), wo (n, 3).
 
-    `place` holds (n, 2) texture coordinates and (n,) distances, for a material that reads them.
+    `place` holds (n, 2) texture coordinates and (n,) distances, for a material that reads them; `maps` what a shader with maps reads from its
+    textures, (n,) or (n, 3) by the name of the parameter.
     """
     attributes = {"v_wi": np.swapaxes(wi, 0, 1), "v_wo": wo, "v_weight": np.swapaxes(weight, 0, 1)}
     for name in shader.stack.reads:
         attributes[f"v_{name}"] = np.reshape(getattr(place, name), (len(wo), -1))
+    for name, values in (maps or {}).items():
+        attributes[f"v_{name.replace('.', '_')}"] = np.reshape(values, (len(wo), -1))
     return shade_points(shader.text(file="samples.frag"), attributes, shader.uniforms)
 
 

@@ -1,0 +1,79 @@
+"""Commands over many fits that are no list of scenes: `map`, a fit for every texel."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .app import Output, Scene, Starts, command
+from .talk import Done, progress, say
+
+
+@command("map")
+def map_texels(
+    scene: Scene,
+    output: Output = Path("out"),
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--free",
+            help="Parameter that every texel has for itself, such as coat.thickness_um or tilt, in place of the scene's [map].free; may be repeated.",
+        ),
+    ] = None,
+    shared: Annotated[
+        list[str] | None,
+        typer.Option("--shared", help="Parameter that is one for all texels, and fitted to all images first; may be repeated."),
+    ] = None,
+    smooth: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="By how much neighbours differ, as a part of the value; left out, texels are fitted apart."),
+    ] = None,
+    size: Annotated[
+        int | None, typer.Option(min=1, help="Texels on a side, over texture coordinates; left out, a texel is a pixel.")
+    ] = None,
+    starts: Starts = None,
+) -> Done:
+    """Fit parameters texel by texel to images of one object under several lights.
+
+    Leaves `maps.exr` (values, sigmas, flags), `textures/`, `material.frag`, which reads them, `map.png`, `preset.json` and `map.json` in the output
+    directory. What is interrupted goes on where it was when the same command is given again. Exit code 1: a parameter is not told in most texels,
+    or there is no shader.
+
+    Example: `layerfit map panel.toml --free coat.thickness_um -o out/panel`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..maps import fit_map
+
+    with progress() as report:
+        found = fit_map(
+            scene, output, free=free or None, shared=shared or (), smooth=smooth, size=size, starts=starts, progress=report
+        )
+    document: Any = found.document
+    for line in _lines(document):
+        say(line)
+    shader = (document["parity"] or {}).get("passed")
+    say(f"Wrote maps.exr, map.png, map.json, preset.json, textures{' and material.frag' if shader else ''} in {output}/")
+    return Done(document, ("view", output / "preset.json"), found.good)
+
+
+def _lines(document: dict[str, Any]) -> list[str]:
+    """What came of each parameter, and of the shader."""
+    height, width = document["size"]
+    lines = [
+        f"{document['texels']} texels of {width} x {height}, {document['references']} references, relative L2 {document['error']['rel_l2']:.4f}"
+    ]
+    for name, row in document["parameters"].items():
+        low, middle, high = row["quartiles"]
+        sigma = "" if row["sigma_median"] is None else f" +/- {row['sigma_median']:.2g}"
+        lines.append(f"{name}: {middle:.4g}{sigma}, half of them {low:.4g} to {high:.4g}; told in {100.0 * row['told']:.3g} %")
+        lines += [f"    {count} texels: {words}" for words, count in row["flags"].items()]
+    parity = document["parity"]
+    if parity is None:
+        lines.append(f"no shader: {document['no_shader']}")
+    else:
+        lines.append(
+            f"shader against JAX: max {parity['max_rel']:.1e}, p99.9 {parity['p999_rel']:.1e} relative, {parity['values']} values"
+        )
+    return lines
