@@ -226,6 +226,13 @@ def test_an_error_that_all_pixels_have_together_is_not_averaged_away():
     np.testing.assert_allclose(together.sigma, np.hypot(alone.sigma, 0.3), rtol=1e-6)
 
 
+def test_where_nothing_shows_nothing_is_known():
+    part = np.arange(60) % GROUPS
+    found = estimate(np.zeros((2, 2)), np.zeros((60, 3, 2)), np.ones((60, 3)), part)
+    assert np.all(np.isinf(found.sigma))
+    assert len(found.blind) == 2
+
+
 def test_a_direction_that_nothing_sees_is_named():
     gram = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 2.0]])
     jacobian = np.repeat([[[1.0, 1.0, 0.0]], [[0.0, 0.0, 2.0**0.5]]], 12, 0) / 12**0.5

@@ -95,7 +95,7 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     """Levenberg-Marquardt for a function that returns its loss and, as auxiliary output, gradient and J^T J.
 
     Optimistix's trust region and damped Newton descent, in coordinates scaled by the diagonal of J^T J (Marquardt 1963) so that the
-    units of the parameters do not matter. Bounds, `options["lower"]` and `options["upper"]`, always hold: a parameter that would go far
+    units of the parameters do not matter. Bounds, `options["lower"]` and `options["upper"]`, always hold: a parameter that would go
     beyond its own is stiffened by the distance to it (after Coleman and Li 1996), a step is clipped to them, and a parameter on its bound
     that the gradient pushes outwards sits out.
     """
@@ -106,6 +106,8 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     """Part of the loss that a step has to promise to be worth taking: far less than noise can tell apart."""
     least: float = 1e-9
     """Trust below which no step is taken."""
+    landing: float = 1e-3
+    """Part of its range before a bound within which a parameter that would go beyond goes there."""
     norm: Callable[[PyTree], Any] = optx.max_norm
     descent: optx.AbstractDescent = optx.DampedNewtonDescent(linear_solver=lx.Cholesky())
     search: optx.AbstractSearch = optx.ClassicalTrustRegion()
@@ -134,8 +136,11 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
         )
         held = ((y <= lower) & (gradient > 0.0)) | ((y >= upper) & (gradient < 0.0))
         room = jnp.where(gradient > 0.0, y - lower, upper - y)
+        # What bends before a bound would never come to it.
+        lands = (room < self.landing * (upper - lower)) & (jnp.abs(gradient) >= jnp.diagonal(gram) * room)
+        edge = jnp.where(gradient > 0.0, lower, upper)
         step = lambda trust: self._descend(gradient, gram, held, room, trust)  # noqa: E731
-        move = lambda trust: jnp.clip(y + step(trust), lower, upper) - y  # noqa: E731
+        move = lambda trust: jnp.where(lands, edge, jnp.clip(y + step(trust), lower, upper)) - y  # noqa: E731
         promise = lambda move: -(gradient @ move + 0.5 * move @ gram @ move)  # noqa: E731
         done = done | (promise(step(step_size)) <= self.gain * loss) | ~jnp.isfinite(loss)
         # Cut off at the bounds, a step can lead uphill. A shorter one is nearer to the gradient, and in the end does not.
@@ -156,10 +161,10 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
         """One damped step of the parameters that are not held, in scaled coordinates; `room` is how far each may go before its bound."""
         diagonal = jnp.diagonal(gram)
         still = held | (diagonal <= 0.0)  # a parameter with no effect has no scale of its own; it stays where it is
-        # A slope ever smaller, as below a coat that hides nearly all, asks for a step ever longer. So much is added to its curvature that
-        # it would be twice the room by itself, past the bound to be cut off there; the others then know of it. Elsewhere nothing is added.
-        needed = jnp.abs(gradient) / jnp.where(room > 0.0, 2.0 * room, 1.0)
-        bent = jnp.where(still, 0.0, jnp.maximum(needed - diagonal, 0.0))
+        # A slope ever smaller, as below a coat that hides nearly all, asks for a step ever longer. Stiffened so that it stays within its
+        # room, it is known to the others; where a step would be far shorter than the room, next to nothing is added.
+        needed = jnp.abs(gradient) / jnp.where(room > 0.0, room, 1.0)
+        bent = jnp.where(still, 0.0, jnp.hypot(needed, diagonal) - diagonal)
         scale = jnp.where(still, 0.0, 1.0 / jnp.sqrt(jnp.where(still, 1.0, diagonal + bent)))
         scaled = (gram + jnp.diag(bent)) * scale[:, None] * scale[None, :]
         scaled = scaled + jnp.diag(jnp.where(still, 1.0, 1e-12))

@@ -63,7 +63,7 @@ def estimate(
     groups = [_normal(jacobian[part == k], gradients[part == k]) for k in range(GROUPS)]
     n = len(gram)
     free = np.arange(n)
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     usable = free[scale > 1e-12 * scale.max()] if n else free
     covariance = np.zeros((n, n))
     blind: list[np.ndarray] = []
