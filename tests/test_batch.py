@@ -44,7 +44,7 @@ def test_every_scene_has_its_row(scenes, tmp_path):
     told = []
     first = fit_batch([manifest], tmp_path / "out", progress=lambda *counts: told.append(counts), **QUICK)
     assert not first.good
-    assert told == [(0, 0, 2), (1, 0, 2), (1, 1, 2)]
+    assert told == [(0, 0, 2), (0, 1, 2), (1, 1, 2)], "what cannot be read is known before what is fitted"
     done, failed = table(tmp_path / "out")
     assert (done["batch of steel"], failed["batch of steel"]) == ("7", "8")
     assert float(done["base.alpha_x"]) == pytest.approx(0.08, rel=1e-4)
@@ -126,9 +126,8 @@ def test_a_quick_fit_with_all_that_it_leaves(gl, scenes, tmp_path):
     document = json.loads((Path(each["directory"]) / "fit.json").read_text())
     assert document["starts"] == 1
     assert not any("sigma_model" in row for row in document["parameters"].values())
-    assert {key: each[key] for key in alone if key.startswith("base.")} == {
-        key: alone[key] for key in alone if key.startswith("base.")
-    }
+    values = [key for key in alone if key.startswith("base.") and not key.endswith(".sigma")]
+    assert [each[key] for key in values] == pytest.approx([alone[key] for key in values], rel=1e-6)
 
 
 def test_the_table_as_parquet(scenes, tmp_path):

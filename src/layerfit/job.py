@@ -141,21 +141,14 @@ def asked(scene: Scene, options: Mapping[str, Any]) -> Scene:
 
 def fit_views(views: Sequence[AnyView], scene: Scene, **options: Any) -> FitResult:
     """What a scene asks for, fitted to its references; `options` are further ones of `fit`."""
-    request = scene.fit
-    return fit(
-        views,
-        scene.start,
-        free=request.free,
-        also=request.also,
-        each=request.each,
-        fixed=dict(request.fixed),
-        metric=request.metric,
-        loss=request.loss,
-        starts=request.starts,
-        seed=request.seed,
-        where=f"{scene.path}: fit",
-        **options,
-    )
+    return fit(views, **request_of(scene), **options)
+
+
+def request_of(scene: Scene) -> dict[str, Any]:
+    """What a scene asks for, as `fit` takes it."""
+    asked = {field.name: getattr(scene.fit, field.name) for field in dataclasses.fields(scene.fit)}
+    del asked["min_cosine"]  # of the references
+    return asked | {"start": scene.start, "fixed": dict(scene.fit.fixed), "where": f"{scene.path}: fit"}
 
 
 def _others(result: FitResult) -> list[tuple[int, Stack]]:

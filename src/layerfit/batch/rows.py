@@ -1,12 +1,14 @@
 """One fit of a batch, as a row of its table."""
 
+import dataclasses
 import time
 from typing import Any
 
-from ..capture.load import load
+from ..capture.load import AnyView, load
+from ..capture.scene import Scene
 from ..capture.scene_file import read_scene
 from ..errors import LayerfitError
-from ..fit.result import correlations, flags, parameters
+from ..fit.result import Fitted, correlations, flags, parameters
 from ..fit.words import structure
 from ..job import asked, fit_scene, fit_views
 from .tasks import Task
@@ -16,32 +18,55 @@ CHANNELS = ("r", "g", "b")
 Row = dict[str, Any]
 
 
-def run(task: Task) -> Row:
-    """Fit one scene; its row, or one with the message of what was at fault."""
+@dataclasses.dataclass(frozen=True)
+class Opened:
+    """A scene with its references read."""
+
+    scene: Scene
+    views: list[AnyView]
+
+
+def opened(task: Task) -> Opened:
+    """Raises `InputError` for a scene that cannot be read."""
+    scene = asked(read_scene(task.scene), task.overrides)
+    return Opened(scene, load(scene))
+
+
+def run(task: Task, found: Opened | None = None) -> Row:
+    """Fit one scene, which may have been opened before; its row, or one with the message of what was at fault."""
     began = time.perf_counter()
     try:
-        row = _values(task)
-    except LayerfitError as error:
-        return failed(task, str(error))
+        return done(task, _values(task, found), time.perf_counter() - began)
     except Exception as error:  # told in its row, and not the end of the others
-        return failed(task, f"{type(error).__name__}: {error} (a fault of layerfit, not of the scene: please report it)")
-    return {"scene": str(task.scene), "error": None, "seconds": round(time.perf_counter() - began, 4), **row}
+        return failed(task, message(error))
+
+
+def message(error: Exception) -> str:
+    """What a row says of what was at fault."""
+    if isinstance(error, LayerfitError):
+        return str(error)
+    return f"{type(error).__name__}: {error} (a fault of layerfit, not of the scene: please report it)"
+
+
+def done(task: Task, values: Row, seconds: float) -> Row:
+    return {"scene": str(task.scene), "error": None, "seconds": round(seconds, 4), **values}
 
 
 def failed(task: Task, message: str) -> Row:
     return {"scene": str(task.scene), "error": message, "seconds": None}
 
 
-def _values(task: Task) -> Row:
-    options = dict(task.options)
-    quick = options.pop("quick", False)
-    if quick:
-        options.setdefault("starts", 1)
+def _values(task: Task, found: Opened | None) -> Row:
+    model_error = not task.quick
     if task.directory is not None:
-        document = fit_scene(task.scene, task.directory, model_error=not quick, **options).document
+        document = fit_scene(task.scene, task.directory, model_error=model_error, **task.overrides).document
         return {**_outcome(document), "directory": str(task.directory), **_columns(document["parameters"])}
-    scene = asked(read_scene(task.scene), options)
-    result = fit_views(load(scene), scene, model_error=not quick)
+    found = found or opened(task)
+    return values_of(fit_views(found.views, found.scene, model_error=model_error))
+
+
+def values_of(result: Fitted) -> Row:
+    """What a row holds of a fit."""
     rows = parameters(result)
     outcome = {
         "converged": result.converged,

@@ -5,13 +5,19 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from itertools import groupby, islice
 
 from ..cache import use_compilation_cache
-from .rows import Row, failed, run
+from ..fit.many import GROUP
+from .groups import run_all
+from .rows import Row, failed
 from .tasks import Task
+
+PORTION = 2 * GROUP
+"""Quick fits that a worker is given at a time: a second of its work is lost with it."""
 
 TRIES = 2
 """Workers that one scene may take down before it is given up."""
@@ -20,7 +26,7 @@ TRIES = 2
 def fitted(tasks: dict[str, Task], workers: int) -> Iterator[tuple[str, Row]]:
     """Rows as they are known."""
     if workers == 1:
-        yield from ((key, run(task)) for key, task in tasks.items())
+        yield from run_all(tasks)
         return
     left, tries = dict(tasks), dict.fromkeys(tasks, 0)
     while left:
@@ -29,24 +35,39 @@ def fitted(tasks: dict[str, Task], workers: int) -> Iterator[tuple[str, Row]]:
             yield from _shared(pool, left, tries, workers)
 
 
+def run_portion(tasks: dict[str, Task]) -> list[tuple[str, Row]]:
+    """What a worker does at a time."""
+    return list(run_all(tasks))
+
+
+def portions(tasks: Mapping[str, Task], workers: int) -> Iterator[dict[str, Task]]:
+    """Tasks by as many as a worker is given at a time: quick ones by the group, others take long enough alone."""
+    size = max(1, min(PORTION, -(-len(tasks) // workers)))
+    for quick, some in groupby(tasks.items(), lambda item: item[1].quick and item[1].directory is None):
+        while portion := dict(islice(some, size if quick else 1)):
+            yield portion
+
+
 def _shared(pool: Executor, left: dict[str, Task], tries: dict[str, int], workers: int) -> Iterator[tuple[str, Row]]:
     """Rows until all are known, or a worker is killed: what was in hand then was tried. What was tried before goes first, and alone, so
     that no scene is given up for what another does to its worker."""
-    waiting = deque(sorted(left, key=lambda key: -tries[key]))
-    running: dict[Future[Row], str] = {}
+    again = [{key: left[key]} for key in left if tries[key]]
+    waiting = deque([*again, *portions({key: left[key] for key in left if not tries[key]}, workers)])
+    running: dict[Future[list[tuple[str, Row]]], dict[str, Task]] = {}
     try:
         while waiting or running:
-            alone = any(tries[key] for key in (*running.values(), *list(waiting)[:1]))
-            while waiting and len(running) < (1 if alone else workers):
-                key = waiting.popleft()
-                running[pool.submit(run, left[key])] = key
+            alone = any(tries[key] for portion in (*running.values(), *list(waiting)[:1]) for key in portion)
+            while waiting and len(running) < (1 if alone else workers + 1):  # none waits for the next to be handed over
+                portion = waiting.popleft()
+                running[pool.submit(run_portion, portion)] = portion
             for future in wait(running, return_when=FIRST_COMPLETED).done:
-                row = future.result()
-                key = running.pop(future)
-                del left[key]
-                yield key, row
+                rows = future.result()
+                del running[future]
+                for key, row in rows:
+                    del left[key]
+                    yield key, row
     except BrokenProcessPool:
-        for key in running.values():
+        for key in (key for portion in running.values() for key in portion):
             tries[key] += 1
             if tries[key] == TRIES:
                 yield (

@@ -23,6 +23,17 @@ class Task:
     """Where all that a fit leaves is written; None for the row alone."""
     options: dict[str, Any]
 
+    @property
+    def quick(self) -> bool:
+        """One start, unless more are asked for, and sigmas of the noise alone."""
+        return bool(self.options.get("quick"))
+
+    @property
+    def overrides(self) -> dict[str, Any]:
+        """What is given otherwise than in the scene's [fit] table."""
+        plain = {key: value for key, value in self.options.items() if key != "quick"}
+        return {"starts": 1} | plain if self.quick else plain
+
     def key(self) -> str:
         """What this fit depends on: the scene's text, which files it reads and when they were written, and the options."""
         from .. import __version__

@@ -85,16 +85,16 @@ LEAST = 16
 
 
 def arrange(
-    references: list[Samples], seed: int, needs: tuple[str, ...] = (), names: tuple[str, ...] = ()
+    references: list[Samples], seed: int, needs: tuple[str, ...] = (), names: tuple[str, ...] = (), largest: int = 2**10
 ) -> tuple[Blocks, Layout]:
-    """Blocks of all references, with weights of 0; `needs` is what the material has to know of the place of a pixel, `names` are all those of the
-    lights, where their samples have to be known.
+    """Blocks of all references, of `largest` pixels at most, with weights of 0; `needs` is what the material has to know of the place of a pixel,
+    `names` are all those of the lights, where their samples have to be known.
 
     The references take turns, block by block.
     """
     lights = max(s.wi.shape[1] for s in references)
     longest = max(len(s.index) for s in references)
-    size = min(block_size(lights), _power_of_two(longest, 32))
+    size = min(block_size(lights), largest, power_of_two(longest, 32))
     rows: list[tuple[int, np.ndarray]] = []
     for k, samples in enumerate(references):
         order = stratified(samples, seed + k)
@@ -143,7 +143,7 @@ def weighted(blocks: Blocks, layout: Layout, weights: list[np.ndarray]) -> Block
 
 def held(values: np.ndarray) -> Any:
     """An array (blocks, ...) where JAX has its own, with room for more blocks."""
-    missing = _power_of_two(len(values), LEAST) - len(values)
+    missing = power_of_two(len(values), LEAST) - len(values)
     return jax.device_put(np.pad(values, [(0, missing)] + [(0, 0)] * (np.ndim(values) - 1)))
 
 
@@ -152,6 +152,6 @@ def channels_first(values: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.moveaxis(values, -1, 1))
 
 
-def _power_of_two(n: int, least: int) -> int:
+def power_of_two(n: int, least: int) -> int:
     """The smallest power of two that is not below n, and not below the least."""
     return max(least, 2 ** (n - 1).bit_length())

@@ -42,6 +42,8 @@ class CubeRoot:
 
 
 Curve = Log | CubeRoot
+CURVED = ("log", "cube_root")
+"""Metrics that bring values to something else before they are compared."""
 
 
 def curve(metric: str, white: np.ndarray) -> Curve | None:

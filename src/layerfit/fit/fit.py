@@ -15,12 +15,12 @@ from ..documents import nearest
 from ..errors import InputError
 from ..stack import Stack
 from . import discrepancy
+from .asked import what_is_asked
 from .nuisances import THICKNESS
-from .parameters import parametrise, with_fixed
 from .problem import Problem
 from .profile import ABSORBING, Profile, along, deep, lower_limit, scatter, threshold
 from .residuals import NEAR
-from .result import FitResult, Held
+from .result import FitResult
 from .starts import (
     COARSE_STEPS,
     FINE_STEPS,
@@ -34,14 +34,12 @@ from .starts import (
     search,
     space_filling,
 )
+from .together import ROUNDS
 from .uncertainty import Uncertainty, estimate
 from .weights import misfit
 
 COARSE_BLOCKS = 2
 """Blocks of pixels for the search, and at least one of each reference: enough to tell minima apart."""
-
-ROUNDS = 3
-"""Reweightings: the weights follow the model's values, which follow the weights."""
 
 
 def fit(
@@ -82,26 +80,22 @@ class _Fit:
     def __init__(
         self, views, start, free, also, each, fixed, metric, loss, starts, seed, model_error, profile, where, progress
     ):
-        start = with_fixed(start, fixed, f"{where}.fixed")
-        self.explicit = free is not None
-        free, self.held = _without_gauge(start, free, views)
-        start, free = parametrise(start, free, tuple(fixed), where, views, also, each)
-        names = [f.name for f in free.free]
+        wanted = what_is_asked(views, start, free, also, each, fixed, where)
+        names = [f.name for f in wanted.free.free]
         if unknown := [name for name in profile if name not in names]:
             raise InputError(
                 f"{where}: there is no profile of {unknown[0]!r}{nearest(unknown[0], names)}: it is not fitted; {', '.join(names)} are"
             )
-        for view in views:
-            view.check(start)
+        self.explicit, self.held = free is not None, wanted.held
         self.starts, self.seed, self.where = starts, seed, where
         self.model_error, self.profile, self.progress = model_error, profile, progress
         self.notes: list[str] = [
             f"only ratios of thickness show: {f.name} was held at {f.told:g}, and the others are over it"
-            for f in free.held
+            for f in wanted.free.held
             if f.field == THICKNESS
         ]
         self.clock = dataclasses.replace(CLOCK)
-        self.problem = Problem(views, start, free, metric, loss, seed)
+        self.problem = Problem(views, wanted.start, wanted.free, metric, loss, seed)
 
     def run(self) -> FitResult:
         problem = self.problem
@@ -270,21 +264,3 @@ class _Fit:
 
 def _have_no_effect(names: Sequence[str]) -> str:
     return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no effect on this image"
-
-
-def _without_gauge(
-    start: Stack, free: Sequence[str] | None, views: Sequence[AnyView]
-) -> tuple[Sequence[str] | None, list[Held]]:
-    """Hold one of two fields that enter only together, such as the thickness of a coat whose absorption is fitted too.
-
-    What a base does with light is another matter at another thickness: there the images tell.
-    """
-    held = []
-    told = len({view.reference.thickness_scale.get(start.base.name, 1.0) for view in views}) > 1
-    for layer in start.layers if told else (*start.layers, start.base):
-        for kept, other, sign, why in getattr(layer, "gauges", ()):
-            first, second = f"{layer.name}.{kept}", f"{layer.name}.{other}"
-            if free is not None and first in free and second in free:
-                free = [name for name in free if name != second]
-                held.append(Held({first: 1.0, second: sign}, f"{why}; {second} was held at its start"))
-    return free, held

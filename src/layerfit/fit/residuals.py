@@ -41,20 +41,21 @@ def _material(u: Any, start: Stack, scale: Any, *, free: Parametrisation) -> tup
     return tangents(made, free.fields(u))
 
 
+def seen(made: tuple[Any, Any], block: Blocks, *, form: Any) -> Any:
+    """What the model shows at one block of pixels, (channels, pixels), as it is compared; `made` is the material, prepared, and how bright its
+    lights are."""
+    prepared, lit = made
+    weight = block.weight if block.lights is None else block.weight * _bright(block.lights, lit)[:, None]
+    model = shade(prepared, block.wi, block.wo, weight, block.place, form=form)
+    if lit and block.lights is None:
+        model = model * lit[WHOLE][:, None]
+    return model if block.curve is None else block.curve(model)
+
+
 def _columns(material: tuple[Any, Any], block: Blocks, *, form: Any) -> Any:
     """The model's derivatives and residual over one block of pixels, in the precision of the block."""
-
-    def residual(made: Any) -> Any:
-        prepared, lit = made
-        weight = block.weight if block.lights is None else block.weight * _bright(block.lights, lit)[:, None]
-        model = shade(prepared, block.wi, block.wo, weight, block.place, form=form)
-        if lit and block.lights is None:
-            model = model * lit[WHOLE][:, None]
-        if block.curve is None:
-            return (model - block.target) * block.inverse_sigma
-        return (block.curve(model) - block.curve(block.target)) * block.inverse_sigma
-
-    return columns(residual, *material)
+    target = block.target if block.curve is None else block.curve(block.target)
+    return columns(lambda made: (seen(made, block, form=form) - target) * block.inverse_sigma, *material)
 
 
 def _bright(lights: Mapping[str, Any], lit: Lit) -> Any:
@@ -70,7 +71,7 @@ def _descend(
     alike = scale is None and not free.apart
 
     def evaluate(u: Any, kept: Any) -> Any:
-        made = _materials(u.astype(dtype), start, None if scale is None else scale.astype(dtype), free)
+        made = materials(u.astype(dtype), start, None if scale is None else scale.astype(dtype), free)
 
         def add(k: Any, sums: Any) -> Any:
             total, kept = sums
@@ -89,7 +90,7 @@ def _descend(
     return u, jax.tree.leaves(state), losses, kept
 
 
-def _materials(u: Any, start: Stack, scale: Any, free: Parametrisation) -> tuple[Any, Any]:
+def materials(u: Any, start: Stack, scale: Any, free: Parametrisation) -> tuple[Any, Any]:
     """`_material` of every reference, where they are not the same."""
     if scale is None and not free.apart:
         return _material(u, start, None, free=free)

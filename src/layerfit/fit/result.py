@@ -52,17 +52,12 @@ class Held:
     why: str
 
 
-@dataclasses.dataclass
-class FitResult:
-    """A fitted material and what is known of it."""
+@dataclasses.dataclass(repr=False)
+class Fitted:
+    """A fitted material and what is known of it, without the images."""
 
     stack: Stack
     """The material; where references have something for themselves, that of the first."""
-    materials: list[Stack]
-    """As it is in each reference, as thick as it is there."""
-    lights: list[Lit]
-    """How bright the lights of each reference are, over what the scene says; of ambient light the radiance. Empty where they are known."""
-    start: Stack
     free: Parametrisation
     vector: np.ndarray
     start_vector: np.ndarray
@@ -78,19 +73,12 @@ class FitResult:
     steps: int
     minima: list[Minimum]
     notes: list[str]
-    trace: list[Row]
-    models: list[np.ndarray]
-    """Radiance of the fitted material at the usable pixels of each reference."""
     misfit: float
     """Weighted residual over the weighted image, without the noise that the files state."""
     profiles: list[Profile]
     """Of the parameters that were asked for, and of depths that are but lower limits."""
     hidden: list[str]
     """Parameters of what lies below a coat that may be opaque: whatever they are, the images can be the same."""
-    samples: list[Samples]
-    views: Sequence[AnyView]
-    clock: Clock
-    solve_s: float
 
     def __repr__(self) -> str:
         return "\n".join([_heading(self), *words.parameters(parameters(self))])
@@ -101,13 +89,31 @@ class FitResult:
         return f"<p>{html.escape(_heading(self))}</p>{words.table(parameters(self))}{words.blocks(remarks)}"
 
 
-def _heading(result: FitResult) -> str:
+@dataclasses.dataclass(repr=False)
+class FitResult(Fitted):
+    """A fitted material, what is known of it, and what it was fitted to."""
+
+    materials: list[Stack]
+    """As it is in each reference, as thick as it is there."""
+    lights: list[Lit]
+    """How bright the lights of each reference are, over what the scene says; of ambient light the radiance. Empty where they are known."""
+    start: Stack
+    trace: list[Row]
+    models: list[np.ndarray]
+    """Radiance of the fitted material at the usable pixels of each reference."""
+    samples: list[Samples]
+    views: Sequence[AnyView]
+    clock: Clock
+    solve_s: float
+
+
+def _heading(result: Fitted) -> str:
     found = flags(result, parameters(result), correlations(result))
     outcome = words.converged(result.converged, result.steps)
     return f"{words.structure(result.stack)}; converged: {outcome}; flags: {', '.join(found) or 'none'}"
 
 
-def parameters(result: FitResult) -> dict[str, dict[str, Any]]:
+def parameters(result: Fitted) -> dict[str, dict[str, Any]]:
     """Every free parameter with its value, start, sigma and state, and the derived optical depths.
 
     Where the form's error was measured, `sigma` holds `sigma_noise` and `sigma_model`, and `corrected` is the value without that error.
@@ -142,7 +148,7 @@ def parameters(result: FitResult) -> dict[str, dict[str, Any]]:
     return rows
 
 
-def _interval(result: FitResult, f: Free, slot: int) -> list[float | None] | None:
+def _interval(result: Fitted, f: Free, slot: int) -> list[float | None] | None:
     """Ends of the 95 % interval of one entry, in the units of the field: None for an end that there is none of, or without a profile."""
     profile = next((p for p in result.profiles if p.slot == slot), None)
     if profile is None:
@@ -154,14 +160,14 @@ def _is_lower_limit(ends: list[float | None] | None) -> bool:
     return ends is not None and ends[1] is None and bool(ends[0])
 
 
-def _at_bounds(result: FitResult) -> tuple[np.ndarray, np.ndarray]:
+def _at_bounds(result: Fitted) -> tuple[np.ndarray, np.ndarray]:
     """Which entries of the vector stand at the lower and at the upper end of their range."""
     lower, upper = result.free.bounds()
     near = NEAR_BOUND * (upper - lower)
     return result.vector <= lower + near, result.vector >= upper - near
 
 
-def _sigmas(result: FitResult) -> np.ndarray:
+def _sigmas(result: Fitted) -> np.ndarray:
     """Sigmas in the coordinates of the fit; at a bound, how far inside the truth may be. NaN for what is but a limit, and what that hides."""
     sigma = np.sqrt(sum(part**2 for part in _sigma_parts(result).values()))
     for f in result.free.free:
@@ -171,7 +177,7 @@ def _sigmas(result: FitResult) -> np.ndarray:
     return sigma
 
 
-def _sigma_parts(result: FitResult) -> dict[str, np.ndarray]:
+def _sigma_parts(result: Fitted) -> dict[str, np.ndarray]:
     """By what the images are scattered by, and by what the form gets wrong: the whole of it, as no one value is owed the correction."""
     parts = {"sigma_noise": result.uncertainty.sigma}
     if result.discrepancy is not None:
@@ -179,7 +185,7 @@ def _sigma_parts(result: FitResult) -> dict[str, np.ndarray]:
     return parts
 
 
-def _corrected(result: FitResult) -> np.ndarray:
+def _corrected(result: Fitted) -> np.ndarray:
     """The vector that an exact form would have been fitted with, inside the bounds."""
     step = np.zeros_like(result.vector) if result.discrepancy is None else result.discrepancy.step
     if np.any(_at_bounds(result)):
@@ -192,7 +198,7 @@ def _sigma(values: np.ndarray) -> Any:
     return finite[0] if len(finite) == 1 else finite
 
 
-def _derived_tau(result: FitResult, layer: Any) -> dict[str, Any]:
+def _derived_tau(result: Fitted, layer: Any) -> dict[str, Any]:
     """tau = absorption thickness, with the sigma of whichever is fitted."""
     tau = np.broadcast_to(np.asarray(layer.optical_depth, float), 3)
     sigma = np.zeros(3)
@@ -204,7 +210,7 @@ def _derived_tau(result: FitResult, layer: Any) -> dict[str, Any]:
     return {"value": rounded(tau), "sigma": _sigma(sigma), "derived": "absorption_per_mm * thickness_um"}
 
 
-def correlations(result: FitResult) -> list[list[Any]]:
+def correlations(result: Fitted) -> list[list[Any]]:
     """Pairs of parameters that the data tell apart badly, strongest first."""
     matrix, names = result.uncertainty.correlation, result.free.names
     pairs = [
@@ -216,7 +222,7 @@ def correlations(result: FitResult) -> list[list[Any]]:
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
-def unidentified(result: FitResult) -> list[dict[str, Any]]:
+def unidentified(result: Fitted) -> list[dict[str, Any]]:
     """Directions in which the parameters move without being seen, in words."""
     scale = np.sqrt(np.maximum(np.diag(result.gram), 0.0))
     rows = []
@@ -228,7 +234,7 @@ def unidentified(result: FitResult) -> list[dict[str, Any]]:
     return rows
 
 
-def minima(result: FitResult) -> list[dict[str, Any]]:
+def minima(result: Fitted) -> list[dict[str, Any]]:
     """Where the starts led, best first: which of them, the cost over that of the best with the same weights, and the values there."""
     values = [result.vector, *(m.vector for m in result.minima[1:])]
     return [
@@ -242,7 +248,7 @@ def minima(result: FitResult) -> list[dict[str, Any]]:
     ]
 
 
-def profiles(result: FitResult) -> list[dict[str, Any]]:
+def profiles(result: Fitted) -> list[dict[str, Any]]:
     """The cost along parameters, over the rise that ends their 95 % interval."""
     fields = {slot: f for f in result.free.free for slot in f.slots}
     return [
@@ -255,7 +261,7 @@ def profiles(result: FitResult) -> list[dict[str, Any]]:
     ]
 
 
-def flags(result: FitResult, rows: dict[str, dict[str, Any]], pairs: list[list[Any]]) -> list[str]:
+def flags(result: Fitted, rows: dict[str, dict[str, Any]], pairs: list[list[Any]]) -> list[str]:
     """What a reader should know before using the values; empty for a fit without blemish."""
     found = [] if result.converged else ["not_converged"]
     found += ["poor_fit"] if result.misfit > POOR else []

@@ -67,16 +67,20 @@ def dense(columns: np.ndarray, slots: tuple[tuple[int, ...], ...], size: int | N
 def normal_equations(products: Float[Array, "c k k"], slots: tuple[tuple[int, ...], ...], size: int | None = None) -> Normal:
     """Half the sum of squares, its gradient and J^T J; `slots` are the places of each field's entries in the vector of parameters, of
     `size` entries: none of a field that is held. Left out, there are as many as places."""
-    channels = len(products)
     size = sum(len(s) for s in slots) if size is None else size
-    # entry[k, c, i]: channel c of field k is, or is part of, parameter i.
+    entry = entries(slots, size, len(products))
+    gram = jnp.einsum("kci,ckl,lcj->ij", entry, products[:, :-1, :-1], entry)
+    gradient = jnp.einsum("kci,ck->i", entry, products[:, :-1, -1])
+    return 0.5 * jnp.sum(products[:, -1, -1]), (gradient, gram)
+
+
+def entries(slots: tuple[tuple[int, ...], ...], size: int, channels: int = 3) -> np.ndarray:
+    """(fields, channels, size): 1 where a channel of a field is, or is part of, a parameter."""
     entry = np.zeros((len(slots), channels, size))
     for k, at in enumerate(slots):
         if at:
             entry[k, np.arange(channels), np.array(at)] = 1.0
-    gram = jnp.einsum("kci,ckl,lcj->ij", entry, products[:, :-1, :-1], entry)
-    gradient = jnp.einsum("kci,ck->i", entry, products[:, :-1, -1])
-    return 0.5 * jnp.sum(products[:, -1, -1]), (gradient, gram)
+    return entry
 
 
 class _State(eqx.Module):
@@ -113,9 +117,7 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     search: optx.AbstractSearch = optx.ClassicalTrustRegion()
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):
-        rest = _at_rest(self, y.size)
-        trust = np.asarray(options.get("trust", 1.0), float)
-        return dataclasses.replace(rest, y_eval=y, step_size=trust, search=dataclasses.replace(rest.search, step_size=trust))
+        return begun(at_rest(self, y.size), y, np.asarray(options.get("trust", 1.0), float))
 
     def step(self, fn, y, args, options, state, tags):
         lower, upper = options["lower"], options["upper"]
@@ -216,8 +218,13 @@ def descend(
     return lax.while_loop(goes_on, step, at)[1:]
 
 
+def begun(rest: Any, y: Any, trust: Any) -> Any:
+    """The state before the first step from `y`, with this trust in it."""
+    return dataclasses.replace(rest, y_eval=y, step_size=trust, search=dataclasses.replace(rest.search, step_size=trust))
+
+
 @functools.cache
-def _at_rest(solver: NormalLevenbergMarquardt, n: int) -> _State:
+def at_rest(solver: NormalLevenbergMarquardt, n: int) -> _State:
     """State before the first step, of n parameters: numbers of NumPy, for nothing here is worth a compiler's time."""
     zero = np.zeros(())
     info = solver._info(zero, np.zeros(n), np.eye(n))

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -41,26 +42,59 @@ class Uncertainty:
         return self.covariance / scale[:, None] / scale[None, :]
 
 
+@dataclasses.dataclass(frozen=True)
+class Sums:
+    """What the pixels say of n parameters, added up: all that their spread is made of."""
+
+    gram: Any
+    """(n, n) J^T J, as the fit left it."""
+    scatter: Any
+    """(n, n) products of the gradients of each pixel."""
+    part_grams: Any
+    """(GROUPS, n, n) J^T J of each part of the image."""
+    part_gradients: Any
+    """(GROUPS, n)"""
+    alike: Any
+    """(k, n) J^T of errors that all pixels have together."""
+    residuals: int
+
+
 def estimate(
     gram: np.ndarray, jacobian: np.ndarray, residual: np.ndarray, part: np.ndarray, alike: Sequence[np.ndarray] = ()
 ) -> Uncertainty:
+    """`spread` of what was not added up yet.
+
+    `jacobian` (pixels, channels, parameters) and `residual` (pixels, channels) are weighted; pixels that do not count have `part` -1, others
+    that of the image that they are in. `alike` are errors of the residuals (pixels, channels) that all pixels have together, one standard
+    deviation of each.
+    """
+    gradients = np.einsum("pci,pc->pi", jacobian, residual)
+    groups = [_normal(jacobian[part == k], gradients[part == k]) for k in range(GROUPS)]
+    return spread(
+        Sums(
+            gram=gram,
+            scatter=gradients.T @ gradients,
+            part_grams=np.array([of_part for _, of_part in groups]),
+            part_gradients=np.array([of_part for of_part, _ in groups]),
+            alike=[np.einsum("pci,pc->i", jacobian, error) for error in alike],
+            residuals=int(np.sum(part >= 0)) * residual.shape[1],
+        )
+    )
+
+
+def spread(sums: Sums) -> Uncertainty:
     """Covariance of the parameters, as if there were no bounds.
 
     A value that stands at its bound is not known to be there: noise has pushed it out, and the truth is somewhere inside. Taken as known, it
     would lend its partners a certainty that nobody has.
 
-    `jacobian` (pixels, channels, parameters) and `residual` (pixels, channels) are weighted; pixels that do not count have `part` -1. The
-    gradients of the pixels scatter as their errors do, whatever the weights expected: the sum of their products, between two
+    The gradients of the pixels scatter as their errors do, whatever the weights expected: the sum of their products, between two
     inverses of J^T J (Huber 1967; White 1980), over the degrees of freedom. By pixels, not by residuals: errors of the channels of one
     pixel are of the same light paths, and alike. That takes pixels as independent. Systematic misfit, which a closed form always has, is
-    alike in neighbours, and pulls parts of the image apart: a jackknife over the parts, `part` (pixels,) of `GROUPS`, one Newton
-    step each, widens what it finds to be wider than chance makes it. `alike` are errors of the residuals (pixels, channels)
-    that all pixels have together, one standard deviation of each.
+    alike in neighbours, and pulls parts of the image apart: a jackknife over the parts, one Newton step each, widens what it finds to be wider
+    than chance makes it.
     """
-    gradients = np.einsum("pci,pc->pi", jacobian, residual)
-    scatter = gradients.T @ gradients
-    residuals = int(np.sum(part >= 0)) * residual.shape[1]
-    groups = [_normal(jacobian[part == k], gradients[part == k]) for k in range(GROUPS)]
+    gram = sums.gram
     n = len(gram)
     free = np.arange(n)
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
@@ -78,17 +112,17 @@ def estimate(
             full = np.zeros(n)
             full[usable] = vector
             blind.append(full)
-        freedom = residuals / max(residuals - len(usable), 1)
-        spread = freedom * _sandwich(values, vectors, scatter[at] / unit) / unit
-        moves = np.array([newton(gram - part_gram, part)[usable] for part, part_gram in groups])
-        apart = (len(groups) - 1) / max(len(groups), 1) * np.sum((moves - moves.mean(0)) ** 2, 0)
+        freedom = sums.residuals / max(sums.residuals - len(usable), 1)
+        spread = freedom * _sandwich(values, vectors, sums.scatter[at] / unit) / unit
+        moves = newton(gram - sums.part_grams, sums.part_gradients)[:, usable]
+        apart = (GROUPS - 1) / GROUPS * np.sum((moves - moves.mean(0)) ** 2, 0)
         ratio = apart / np.maximum(np.diag(spread), 1e-300)
         factor = np.sqrt(np.maximum(ratio - (CHANCE - 1.0), 1.0))
         covariance[at] = spread * np.outer(factor, factor)
-    for error in alike:
-        step = newton(gram, np.einsum("pci,pc->i", jacobian, error))
+    for gradient in sums.alike:
+        step = newton(gram, gradient)
         covariance += np.outer(step, step)
-    return Uncertainty(covariance, blind, -newton(gram, gradients.sum(0)))
+    return Uncertainty(covariance, blind, -newton(gram, np.sum(sums.part_gradients, 0)))
 
 
 def _normal(jacobian: np.ndarray, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -110,14 +144,14 @@ def _sandwich(values: np.ndarray, vectors: np.ndarray, scatter: np.ndarray) -> n
 
 
 def newton(gram: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """(J^T J)^-1 times gradients (..., parameters), along what the data see."""
-    diagonal = np.diag(gram)
-    still = diagonal <= 1e-24 * diagonal.max()
+    """(J^T J)^-1 times gradients (..., parameters), along what the data see; of one J^T J, or of one for each."""
+    diagonal = np.diagonal(gram, axis1=-2, axis2=-1)
+    still = diagonal <= 1e-24 * diagonal.max(-1, keepdims=True)
     scale = np.where(still, 0.0, 1.0 / np.sqrt(np.where(still, 1.0, diagonal)))
-    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
+    values, vectors = np.linalg.eigh(gram * scale[..., :, None] * scale[..., None, :])
     seen = values >= BLIND
-    inverse = vectors[:, seen] / values[seen] @ vectors[:, seen].T
-    return (gradient * scale) @ inverse * scale
+    inverse = vectors * np.where(seen, 1.0 / np.where(seen, values, 1.0), 0.0)[..., None, :] @ vectors.swapaxes(-1, -2)
+    return ((gradient * scale)[..., None, :] @ inverse)[..., 0, :] * scale
 
 
 def in_words(direction: np.ndarray, free: Parametrisation, scale: np.ndarray) -> tuple[dict[str, float], str]:
