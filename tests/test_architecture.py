@@ -67,6 +67,7 @@ GATES = {
     "anywidget": "notebook.widget",  # an extra
     "matplotlib": "plot",  # an extra
     "traitlets": "notebook.widget",
+    "distributed": "batch.cluster",  # an extra
     "typer": "cli",
     "jax._src": "shader.names",  # JAX's internals may move
 }

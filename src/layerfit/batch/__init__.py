@@ -14,10 +14,11 @@ from typing import Any
 
 from ..documents import check_directory, write_text
 from ..fit import words
+from .cluster import fitted as fitted_on
 from .rows import Row
 from .sharing import fitted
-from .table import JOURNAL, journal, write_line, write_table
-from .tasks import tasks_of
+from .table import JOURNAL, Journal, write_table
+from .tasks import Task, tasks_of
 
 Progress = Callable[[int, int, int], None]
 
@@ -27,7 +28,8 @@ class Batch:
     """What a batch leaves behind."""
 
     document: dict[str, Any]
-    rows: list[Row]
+    rows: Sequence[Row]
+    """Read from the journal as they are asked for."""
     good: bool
     """Nothing failed."""
 
@@ -41,6 +43,7 @@ def fit_batch(
     directory: str | Path,
     *,
     workers: int = 1,
+    scheduler: str | None = None,
     each: bool = False,
     quick: bool = False,
     progress: Progress = lambda done, failed, total: None,
@@ -49,7 +52,8 @@ def fit_batch(
     """Fit every scene, and write one table to `directory`: `results.csv`, and `results.parquet` where pyarrow is installed.
 
     `scenes` are scene files, patterns such as "captures/*.toml", directories of scene files, or manifests: CSV files with a column `scene`,
-    whose other columns label the rows. `workers` processes share the work; a scene whose worker is killed is tried again. With `each`,
+    whose other columns label the rows. `workers` processes share the work, or with `scheduler`, such as "tcp://node1:8786", those of a
+    cluster of dask.distributed, who read the same files; a scene whose worker is killed is tried again. With `each`,
     every fit leaves in a directory of its own what `layerfit fit` leaves; with `quick`, fits have one start and do not measure the form's
     error. `options` override the scenes' [fit] tables. `progress` is told how many are done, failed and there. Raises `InputError` where
     there is nothing to fit or nowhere to write.
@@ -57,31 +61,35 @@ def fit_batch(
     directory = Path(directory)
     check_directory(directory)
     options = {key: value for key, value in options.items() if value is not None} | ({"quick": True} if quick else {})
-    tasks = tasks_of(scenes, directory, each, options)
+    tasks = {task.key(): task for task in tasks_of(scenes, directory, each, options)}
     directory.mkdir(parents=True, exist_ok=True)
-    keys = [task.key() for task in tasks]
-    kept = {key: row for key, row in journal(directory / JOURNAL) if row["error"] is None}
-    rows = {key: kept[key] for key in keys if key in kept}
-    left = {key: task for key, task in zip(keys, tasks, strict=True) if key not in rows}
-    began, already, failed = time.perf_counter(), len(rows), 0
-    progress(already, 0, len(tasks))
+    journal = Journal(directory / JOURNAL)
+    left = {key: task for key, task in tasks.items() if not journal.done(key)}
+    began, done, failed = time.perf_counter(), len(tasks) - len(left), 0
+    already = done
+    progress(done, failed, len(tasks))
     try:
-        for key, row in fitted(left, workers):
-            rows[key] = left[key].labels | row
-            write_line(directory / JOURNAL, {"key": key, "row": rows[key]})
-            failed += row["error"] is not None
-            progress(len(rows) - failed, failed, len(tasks))
+        for rows in fitted_on(left, scheduler) if scheduler else fitted(left, workers):
+            journal.write((key, _labelled(row, left[key])) for key, row in rows)
+            failed += sum(row["error"] is not None for _, row in rows)
+            done += sum(row["error"] is None for _, row in rows)
+            progress(done, failed, len(tasks))
     finally:
-        table = write_table(directory, [rows[key] for key in keys if key in rows])
+        table = write_table(directory, journal.rows(list(tasks)))
     seconds = time.perf_counter() - began
     document = {
         "schema": "layerfit/batch",
         "version": 1,
-        "done": len(rows) - failed,
+        "done": done,
         "failed": failed,
         "kept": already,
-        "fits_per_s": round((len(rows) - already) / seconds, 3) if len(rows) > already else None,
+        "fits_per_s": round((done + failed - already) / seconds, 3) if left else None,
         "table": str(table),
     }
     write_text(directory / "batch.json", json.dumps(document, indent=2) + "\n")
-    return Batch(document, [rows[key] for key in keys], failed == 0)
+    return Batch(document, journal.rows(list(tasks)), failed == 0)
+
+
+def _labelled(row: Row, task: Task) -> Row:
+    """A row with what its scene is called here."""
+    return task.labels | row | {"scene": str(task.scene)}

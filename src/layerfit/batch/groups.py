@@ -12,7 +12,8 @@ from .tasks import Task
 KINDS = 8
 """Kinds of fits that wait at the same time for more of theirs, at most: they wait with all their pixels."""
 
-Rows = Iterator[tuple[str, Row]]
+Rows = Iterator[list[tuple[str, Row]]]
+"""Of fits by their keys, as they are known: those of a group together."""
 
 
 class _Member:
@@ -41,13 +42,13 @@ class _Member:
 
 
 def run_all(tasks: Mapping[str, Task]) -> Rows:
-    """Fit scenes; their rows as they are known, with a message where one failed. While a group is fitted, the next one is read."""
+    """Fit scenes; a row with a message where one failed. While a group is fitted, the next one is read."""
     waiting: dict[object, list[_Member]] = {}
     rows = _none
     for key, task in tasks.items():
         member = _Member(key, task)
         if member.candidate is None:
-            yield key, member.alone()
+            yield [(key, member.alone())]
             continue
         group = waiting.setdefault(member.candidate.kind, [])
         group.append(member)
@@ -73,6 +74,6 @@ def _begun(group: list[_Member]) -> Callable[[], Rows]:
     def rows() -> Rows:
         found = ended()
         share = (time.perf_counter() - began) / len(group)
-        yield from ((member.key, member.row(fitted, share)) for member, fitted in zip(group, found, strict=True))
+        yield [(member.key, member.row(fitted, share)) for member, fitted in zip(group, found, strict=True)]
 
     return rows

@@ -10,11 +10,11 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 from concurrent.futures.process import BrokenProcessPool
 from itertools import groupby, islice
 
-from ..cache import use_compilation_cache
 from ..fit.many import GROUP
-from .groups import run_all
+from .groups import Rows, run_all
 from .rows import Row, failed
 from .tasks import Task
+from .worker import begin
 
 PORTION = 2 * GROUP
 """Quick fits that a worker is given at a time: a second of its work is lost with it."""
@@ -23,7 +23,7 @@ TRIES = 2
 """Workers that one scene may take down before it is given up."""
 
 
-def fitted(tasks: dict[str, Task], workers: int) -> Iterator[tuple[str, Row]]:
+def fitted(tasks: Mapping[str, Task], workers: int) -> Rows:
     """Rows as they are known."""
     if workers == 1:
         yield from run_all(tasks)
@@ -37,18 +37,18 @@ def fitted(tasks: dict[str, Task], workers: int) -> Iterator[tuple[str, Row]]:
 
 def run_portion(tasks: dict[str, Task]) -> list[tuple[str, Row]]:
     """What a worker does at a time."""
-    return list(run_all(tasks))
+    return [row for rows in run_all(tasks) for row in rows]
 
 
 def portions(tasks: Mapping[str, Task], workers: int) -> Iterator[dict[str, Task]]:
     """Tasks by as many as a worker is given at a time: quick ones by the group, others take long enough alone."""
-    size = max(1, min(PORTION, -(-len(tasks) // workers)))
+    size = max(1, min(PORTION, -(-len(tasks) // (2 * workers))))
     for quick, some in groupby(tasks.items(), lambda item: item[1].quick and item[1].directory is None):
         while portion := dict(islice(some, size if quick else 1)):
             yield portion
 
 
-def _shared(pool: Executor, left: dict[str, Task], tries: dict[str, int], workers: int) -> Iterator[tuple[str, Row]]:
+def _shared(pool: Executor, left: dict[str, Task], tries: dict[str, int], workers: int) -> Rows:
     """Rows until all are known, or a worker is killed: what was in hand then was tried. What was tried before goes first, and alone, so
     that no scene is given up for what another does to its worker."""
     again = [{key: left[key]} for key in left if tries[key]]
@@ -63,23 +63,21 @@ def _shared(pool: Executor, left: dict[str, Task], tries: dict[str, int], worker
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 rows = future.result()
                 del running[future]
-                for key, row in rows:
+                for key, _ in rows:
                     del left[key]
-                    yield key, row
+                yield rows
     except BrokenProcessPool:
         for key in (key for portion in running.values() for key in portion):
             tries[key] += 1
             if tries[key] == TRIES:
-                yield (
-                    key,
-                    failed(left.pop(key), "its worker was killed twice, as by a machine out of memory; try fewer --workers"),
-                )
+                why = "its worker was killed twice, as by a machine out of memory; try fewer --workers"
+                yield [(key, failed(left.pop(key), why))]
 
 
 def _begin_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is for the process that shares out the work
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    use_compilation_cache()
+    begin()
 
 
 def _end_with_parent() -> None:

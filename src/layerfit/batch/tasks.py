@@ -1,16 +1,20 @@
 """What a batch fits: scenes by file, pattern, directory or manifest, and what each fit depends on."""
 
+import contextlib
 import csv
 import dataclasses
+import functools
 import hashlib
+import json
+import stat
+import tomllib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from glob import glob
 from pathlib import Path
 from typing import Any
 
-from ..capture.scene_file import read_scene
-from ..errors import InputError, LayerfitError
+from ..errors import InputError
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,17 +39,38 @@ class Task:
         return {"starts": 1} | plain if self.quick else plain
 
     def key(self) -> str:
-        """What this fit depends on: the scene's text, which files it reads and when they were written, and the options."""
+        """What this fit depends on: the scene's text, the files that it names and when they were written, and the options."""
         from .. import __version__
 
         digest = hashlib.sha256(
             repr((__version__, self.scene.resolve(), sorted(self.options.items()), self.directory)).encode()
         )
-        digest.update(self.scene.read_bytes() if self.scene.is_file() else b"")
-        for file in sorted(_files(self.scene)):
-            known = file.stat() if file.exists() else None
-            digest.update(repr((str(file), known and (known.st_size, known.st_mtime_ns))).encode())
+        with contextlib.suppress(OSError):  # its fit will say what is the matter
+            content = self.scene.read_bytes()
+            digest.update(content)
+            for name in _texts(content, self.scene.suffix):
+                with contextlib.suppress(OSError, ValueError):  # few of them are names of files
+                    known = (self.scene.parent / name).stat()
+                    if stat.S_ISREG(known.st_mode):
+                        digest.update(repr((name, known.st_size, known.st_mtime_ns)).encode())
         return digest.hexdigest()[:24]
+
+
+@functools.lru_cache(maxsize=64)
+def _texts(content: bytes, suffix: str) -> tuple[str, ...]:
+    """Every text in a document, sorted; none of one that cannot be read."""
+    found: set[str] = set()
+
+    def gather(value: Any) -> None:
+        if isinstance(value, str):
+            found.add(value)
+        for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+            gather(item)
+
+    with contextlib.suppress(ValueError, RecursionError):
+        text = content.decode()
+        gather(tomllib.loads(text) if suffix == ".toml" else json.loads(text))
+    return tuple(sorted(found))
 
 
 def tasks_of(scenes: Sequence[str | Path], directory: Path, each: bool, options: dict[str, Any]) -> list[Task]:
@@ -86,18 +111,3 @@ def _manifest(path: Path) -> Iterator[tuple[Path, dict[str, str]]]:
             if None in line or None in line.values():
                 raise InputError(f"{path}: line {lines.line_num} should have {len(lines.fieldnames or [])} columns")
             yield path.parent / line.pop("scene"), line
-
-
-def _files(scene: Path) -> Iterable[Path]:
-    """Files that a scene reads; none where it cannot be read, which its fit will say."""
-    try:
-        references = read_scene(scene).references
-    except LayerfitError:
-        return []
-    lights = [light for reference in references for light in getattr(reference, "lights", ())]
-    files = [
-        *(r.path for r in references),
-        *(getattr(r, "mask", None) for r in references),
-        *(getattr(x, "file", None) for x in lights),
-    ]
-    return {file for file in files if file is not None}

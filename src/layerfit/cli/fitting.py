@@ -184,6 +184,9 @@ def batch(
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the table.")] = Path("out"),
     workers: Annotated[int, typer.Option(min=1, help="Processes that share the work.")] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a cluster of dask that shares it instead, such as tcp://node1:8786.")
+    ] = None,
     each: Annotated[
         bool, typer.Option("--each", help="A directory of each fit too, with all that `layerfit fit` leaves.")
     ] = False,
@@ -213,6 +216,7 @@ def batch(
             scenes,
             output,
             workers=workers,
+            scheduler=scheduler,
             each=each,
             quick=quick,
             progress=report,
