@@ -113,7 +113,7 @@ class Deadly(Task):
 def test_a_scene_that_kills_its_workers_takes_no_other_along(tmp_path):
     tasks = {name: Task(tmp_path / f"{name}.toml", {}, None, {}) for name in "abcdef"}
     tasks["b"] = Deadly(tmp_path / "b.toml", {}, None, {})
-    rows = dict(fitted(tasks, 2))
+    rows = dict(row for some in fitted(tasks, 2) for row in some)
     assert set(rows) == set(tasks)
     assert "killed twice" in rows["b"]["error"]
     assert all("cannot be read" in rows[name]["error"] for name in "acdef")

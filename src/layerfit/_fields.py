@@ -4,6 +4,7 @@ Fit bounds, preset keys, shader comments and the manual's tables are derived fro
 """
 
 import dataclasses
+import functools
 from collections.abc import Iterator
 from typing import Any, Literal, TypeVar, dataclass_transform
 
@@ -66,6 +67,7 @@ def derived(comment: str) -> Any:
     return dataclasses.field(default=None, metadata={"derived": True, "comment": comment})
 
 
+@functools.cache
 def given(cls: Any) -> tuple[str, ...]:
     """Names of the fields that a user gives."""
     return tuple(field.name for field in dataclasses.fields(cls) if not field.metadata.get("derived"))

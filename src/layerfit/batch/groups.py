@@ -16,7 +16,7 @@ Rows = Iterator[list[tuple[str, Row]]]
 """Of fits by their keys, as they are known: those of a group together."""
 
 
-class _Member:
+class Member:
     """A scene that goes in a group, or alone where it is of no group's kind."""
 
     def __init__(self, key: str, task: Task):
@@ -43,10 +43,10 @@ class _Member:
 
 def run_all(tasks: Mapping[str, Task]) -> Rows:
     """Fit scenes; a row with a message where one failed. While a group is fitted, the next one is read."""
-    waiting: dict[object, list[_Member]] = {}
+    waiting: dict[object, list[Member]] = {}
     rows = _none
     for key, task in tasks.items():
-        member = _Member(key, task)
+        member = Member(key, task)
         if member.candidate is None:
             yield [(key, member.alone())]
             continue
@@ -66,7 +66,7 @@ def _none() -> Rows:
     yield from ()
 
 
-def _begun(group: list[_Member]) -> Callable[[], Rows]:
+def _begun(group: list[Member]) -> Callable[[], Rows]:
     """Have a group fitted; its rows, when they are asked for."""
     began = time.perf_counter()
     ended = many.begin([member.candidate for member in group if member.candidate])
