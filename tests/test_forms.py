@@ -175,14 +175,17 @@ def test_reciprocity(name):
 
 
 @jax.jit
+def along(inputs, tangents):
+    """Values of `brdf_rows`, and their derivatives in one direction: a third less to compile than those of all leaves side by side."""
+    return jax.jvp(brdf_rows, inputs, tangents)
+
+
 def columns(*inputs):
     """Values of `brdf_rows`, and their derivatives along each leaf of its arguments, leaf by leaf."""
     leaves, structure = jax.tree.flatten(inputs)
-    basis = [
-        jnp.stack([jnp.ones_like(x) if j == k else jnp.zeros_like(x) for k in range(len(leaves))]) for j, x in enumerate(leaves)
-    ]
-    values, slopes = jax.vmap(lambda t: jax.jvp(brdf_rows, inputs, jax.tree.unflatten(structure, t)))(basis)
-    return values[0], slopes
+    steps = [[np.full_like(x, j == k) for j, x in enumerate(leaves)] for k in range(len(leaves))]
+    found = [along(inputs, jax.tree.unflatten(structure, step)) for step in steps]
+    return found[0][0], np.stack([slopes for _, slopes in found])
 
 
 EDGES = np.array([direction(t, p) for t, p in [(0, 0), (89.99, 0), (89.99, 180), (89.99, 90), (45, 0), (45, 180), (140, 0)]])
@@ -208,7 +211,7 @@ def test_values_and_derivatives(name, dtype):
         for k, leaf in enumerate(leaves):
             h = 1e-6 * float(jnp.max(jnp.abs(leaf))) + 1e-9
             moved = [jax.tree.unflatten(structure, [x + s * h * (j == k) for j, x in enumerate(leaves)]) for s in (1.0, -1.0)]
-            plus, minus = (columns(s, wi, wo)[0][-1] for s in moved)
+            plus, minus = (along(inputs, jax.tree.map(np.zeros_like, inputs))[0][-1] for inputs in ((s, wi, wo) for s in moved))
             np.testing.assert_allclose(slopes[k, -1], (plus - minus) / (2.0 * h), rtol=2e-5, atol=1e-8)
 
 
