@@ -17,7 +17,7 @@ import pytest
 
 from commands import snapshot
 from layerfit import documents
-from layerfit.batch.table import journal, write_line
+from layerfit.batch.table import Journal
 from layerfit.capture.exr import read_exr, write_exr
 from layerfit.documents import of_ours, undisturbed, whole, write_bytes, write_files
 from layerfit.errors import InputError
@@ -88,15 +88,17 @@ def test_a_full_disk_leaves_the_old_picture(way, tmp_path):
 
 
 def test_a_full_disk_leaves_whole_lines(tmp_path):
-    path = tmp_path / "batch.jsonl"
-    write_line(path, {"key": "a", "row": {}})
+    path, row = tmp_path / "batch.jsonl", {"error": None}
+    Journal(path).write([("a", row)])
     before = path.read_bytes()
     with room(len(before) + 10), pytest.raises(InputError, match=r"batch\.jsonl: cannot be written: No space left"):
-        write_line(path, {"key": "b", "row": {"name": "x" * 100}})
+        Journal(path).write([("b", row | {"name": "x" * 100})])
     assert path.read_bytes() == before
     path.write_bytes(before + b'{"key": "c", "ro')  # as a kill leaves it
-    write_line(path, {"key": "d", "row": {}})
-    assert [key for key, _ in journal(path)] == ["a", "d"]
+    Journal(path).write([("d", row | {"name": "last"})])
+    journal = Journal(path)
+    assert [key for key in "abcd" if key in journal] == ["a", "d"]
+    assert list(journal.rows(["a", "d"])) == [row, row | {"name": "last"}]
 
 
 def test_what_is_no_file_is_written_straight(tmp_path):
