@@ -42,6 +42,7 @@ PARTS: dict[str, dict[str, Any]] = {
     "metal with a grain": {"base": "metal", "base_color": RED, "edge_tint": [0.9, 0.8, 1.0], "alpha_x": 0.1, "alpha_y": 0.3},
     "diffuse": {"base": "diffuse", "base_color": RED},
     "glossy": {"base": "glossy", "base_color": RED, "alpha": 0.2, "ior": 1.7},
+    "metal with a film": {"base": "metal", "base_color": RED, "alpha": 0.2, "film_nm": 380.0, "film_eta": 1.6},
     "mixed": {"base": "mixed", "base_color": RED, "edge_tint": [0.9, 0.8, 1.0], "metallic": 0.4, "alpha": 0.2},
 }
 COATED = ("metal", "diffuse", "mixed")
@@ -53,6 +54,8 @@ def engine(dialect: str, part: str, coated: bool) -> Engine:
     rules, values = DIALECTS[dialect], dict(PARTS[part])
     if not rules.edge_tint:
         values.pop("edge_tint", None)
+    if rules.film is None:
+        values = {key: value for key, value in values.items() if not key.startswith("film")}
     if coated:
         values["coat_alpha"] = 0.1
         if rules.coat_index:
@@ -72,7 +75,7 @@ EVERY = pytest.mark.parametrize(("part", "coated"), EACH, ids=[f"{p}, coated" if
 
 @jax.jit
 def _rows(made: Engine, wi: Any, wo: Any) -> Any:
-    return jax.vmap(lambda i, o: jnp.broadcast_to(made.evaluate(i, o), (3,)))(wi, wo)
+    return jax.vmap(lambda i, o: jnp.broadcast_to(made.below(jnp.ones(())).evaluate(i, o), (3,)))(wi, wo)
 
 
 def values(made: Engine, wi: Any, wo: Any) -> np.ndarray:
@@ -225,6 +228,19 @@ def test_next_to_nothing_is_lost_of_what_there_are_words_for(found):
     assert not any("grain" in sentence for sentence in steel.lost)
 
 
+def test_a_film_is_written_where_it_is_nearer_than_none():
+    """Of a temper colour: the extension of glTF, and a start of a fit from it."""
+    stack = read_preset("anodised_titanium")
+    made = convert(stack, "titanium", "gltf")
+    plain = convert(stack, "titanium", "blender")
+    assert made.engine.film_nm is not None
+    assert made.error["delta_e"] < plain.error["delta_e"]
+    assert any("three channels" in sentence for sentence in made.lost)
+    assert gltf.material(made.engine, "titanium")["extensions"][gltf.IRIDESCENCE]["iridescenceFactor"] == 1.0
+    base: Any = stack_of(made.engine).base
+    assert float(base.film_nm) == pytest.approx(float(made.engine.film_nm))
+
+
 def test_gltf_is_valid(found, tmp_path):
     """By the validator of Khronos."""
     script = "const v = require('gltf-validator'), fs = require('fs');" + (
@@ -233,7 +249,8 @@ def test_gltf_is_valid(found, tmp_path):
     node = shutil.which("node")
     if node is None or subprocess.run([node, "-e", "require('gltf-validator')"], capture_output=True, check=False).returncode:
         pytest.skip("no gltf-validator: npm install gltf-validator, and name its node_modules in NODE_PATH")
-    for name, made in found.items():
+    film = {"film": conversion(engine("gltf", "metal with a film", True))}
+    for name, made in (found | film).items():
         path = tmp_path / f"{name}.gltf"
         path.write_text(gltf.write(made))
         ran = subprocess.run([node, "-e", script, str(path)], capture_output=True, text=True, check=True)

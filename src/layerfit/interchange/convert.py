@@ -15,11 +15,15 @@ from ..stack import Stack
 from ..surfaces import Conductor, Dielectric, KubelkaMunk, Lambert
 from .dialects import COAT_INDEX, DIALECTS
 from .engine import Engine
-from .mapping import alone, copied, fitted_fields
+from .mapping import alone, copied, filmed, fitted_fields
 from .stage import default_views, draw, showing
 
 METRIC = "cube_root"
 """In what the search compares: what a viewer sees, not the highlight alone."""
+
+
+THICKNESSES_NM = np.geomspace(30.0, 900.0, 18)
+"""Of films that a search begins with."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,12 +64,30 @@ def convert(stack: Stack, name: str, dialect: str, views: Sequence[AnyView] | No
     """
     seen = "a sphere under two lights" if views is None else ", ".join(str(view.reference.path.name) for view in views)
     shown = showing(list(default_views() if views is None else views), stack)
-    start = copied(stack, dialect)
-    best = _best(start, shown)
-    errors = [_error(shown, engine) for engine in (start, best)]
-    if errors[0]["rel_l2"] < errors[1]["rel_l2"] and errors[0].get("delta_e", 0.0) <= errors[1].get("delta_e", 0.0):
-        best, errors[1] = start, errors[0]  # the values as they are cannot be bettered
-    return Conversion(name, stack, best, errors[1], errors[0], seen, shown, lost(stack, best))
+    plain = copied(stack, dialect)
+    starts = [plain] if (film := filmed(stack, plain)) is None else [plain, film, _nearest_film(film, shown)]
+    best, error, copied_error = min((_tried(start, shown) for start in starts), key=lambda tried: _seen(tried[1]))
+    return Conversion(name, stack, best, error, copied_error, seen, shown, lost(stack, best))
+
+
+def _nearest_film(film: Engine, views: Sequence[AnyView]) -> Engine:
+    """A film as thick as looks most like it: a metal turns the phase of light, a clear medium does not, so that another order may be nearer."""
+    tried = [dataclasses.replace(film, film_nm=float(nm)) for nm in THICKNESSES_NM]
+    return min(tried, key=lambda one: _seen(_error(views, one)))
+
+
+def _tried(start: Engine, views: Sequence[AnyView]) -> tuple[Engine, dict[str, float], dict[str, float]]:
+    """The best values from a start, their error, and that of the start."""
+    best = _best(start, views)
+    copied_error, error = (_error(views, engine) for engine in (start, best))
+    if copied_error["rel_l2"] < error["rel_l2"] and copied_error.get("delta_e", 0.0) <= error.get("delta_e", 0.0):
+        return start, copied_error, copied_error  # the values as they are cannot be bettered
+    return best, error, copied_error
+
+
+def _seen(error: dict[str, float]) -> float:
+    """Delta E where there are pictures."""
+    return error.get("delta_e", error["rel_l2"])
 
 
 def _best(start: Engine, views: Sequence[AnyView]) -> Engine:
@@ -95,8 +117,11 @@ def lost(stack: Stack, engine: Engine) -> tuple[str, ...]:
 
 
 def _lost_of(layer: Any, stack: Stack, engine: Engine) -> list[str]:
+    film = getattr(layer, "film_nm", None) is not None
     said = {
-        "its film: the colour that changes with the angle": getattr(layer, "film_nm", None) is not None,
+        "its film: the colour that changes with the angle": film and engine.film_nm is None,
+        "its film: interference in three channels, on a clear medium that reflects like the metal": film
+        and engine.film_nm is not None,
         "what differs from place to place: its mean is taken": bool(getattr(layer, "reads", ())),
         "Beckmann's facets: GGX in their place": getattr(layer, "distribution", "ggx") != "ggx",
     }

@@ -23,8 +23,15 @@ class Dialect:
     """Whether a metal has a reflectance of its own at 82 degrees (Hoffman 2019)."""
     layered: bool = False
     """Whether a base's dielectric lobe takes from its diffuse part."""
-    compensates: bool = False
-    """Whether lobes are scaled for light that goes to and fro between facets (Turquin 2019)."""
+    compensates: Literal["lobes", "base"] | None = None
+    """Which lobes are scaled for light that goes to and fro between facets (Turquin 2019, eq. 16): all, by their reflectance there, or that of
+    the base alone, by its reflectance at normal incidence."""
+    metal_dims: bool = False
+    """Whether the metal in a mixed base takes from its diffuse part what it reflects at grazing angles."""
+    film: Literal["view", "half"] | None = None
+    """Of which angle the reflectance of a film on a metal is: that of the view or the half angle; None where films are not written."""
+    gaussian: bool = False
+    """Whether the power of Schlick's formula is a spherical Gaussian (Lagarde 2012)."""
     masks_evenly: bool = False
     """Whether facets with a grain hide one another as those without do."""
     widens: float = 0.0
@@ -46,14 +53,15 @@ DIALECTS = {
         path="flat",
         edge_tint=True,
         layered=True,
-        compensates=True,
+        compensates="lobes",
         masks_evenly=True,
         widens=2.0,
         darkens=True,
     ),
     # glTF 2.0, appendix B, and the README of KHR_materials_clearcoat ("fresnel_coat").
     "gltf": Dialect(
-        "glTF 2.0 with KHR_materials_clearcoat",
+        "glTF 2.0 with KHR_materials_clearcoat and KHR_materials_iridescence",
+        film="half",
         layered=True,
     ),
     # Cycles 5.0, kernel/svm/closure.h, with the distribution GGX: the light that leaves is taken to go as the viewer looks.
@@ -65,9 +73,9 @@ DIALECTS = {
         edge_tint=True,
         layered=True,
     ),
-    # three.js, lights_physical_pars_fragment.glsl: the diffuse part is not attenuated by the lobe beside it.
+    # three.js, lights_physical_pars_fragment.glsl of release 187. Earlier ones compensated nothing, and did not dim the diffuse part.
     "three": Dialect(
-        "three.js MeshPhysicalMaterial",
+        "three.js r187, MeshPhysicalMaterial", layered=True, compensates="base", metal_dims=True, gaussian=True, film="view"
     ),
     # Babylon.js, pbrClearCoatFunctions and pbrDirectLightingFunctions.
     "babylon": Dialect(

@@ -1,16 +1,18 @@
 """The coat over a base that other programs draw, as a surface like any other: what fits, draws and measures ours does theirs."""
 
+from dataclasses import replace
 from typing import Any
 
 import jax.numpy as jnp
 
 from .._chunk import clip, safe_sqrt, static
-from .._fields import choice, layer, param
+from .._fields import choice, derived, layer, param
 from .._types import Colour, Number, Scalar, Vec3
 from ..optics.fresnel import dielectric_f0, fresnel_dielectric, fresnel_schlick
 from ..optics.microfacet import density, half_cosine, half_vector, visibility
 from ..surfaces.base import Surface
 from .dialects import COAT_INDEX, DIALECTS, Dialect
+from .iridescence import filmed_reflectance, to_rgb
 
 GRAZING = 1.0 / 7.0
 """Cosine of 82 degrees, where the edge tint of a metal is given (Hoffman 2019)."""
@@ -30,6 +32,10 @@ def _width(which: str) -> Any:
 
 def _index(which: str) -> Any:
     return param(default=None, lower=1.0, upper=3.0, scale="linear", doc=f"index of refraction of {which}", fitted=False)
+
+
+def _adds(stimulus: str) -> Any:
+    return derived(f"what {stimulus} of a film's light adds to each channel")
 
 
 WIDE = 1.0
@@ -57,11 +63,25 @@ class Engine(Surface):
     coat_tau: Number = param(
         default=None, lower=0.0, upper=10.0, scale="softlog", soft=0.05, doc="optical depth of the coat, one way", colour=True
     )
+    film_nm: Number = param(
+        default=None, lower=0.0, upper=2000.0, scale="softlog", soft=100.0, doc="thickness of a film on a metal", unit="nm"
+    )
+    film_eta: Number = _index("the film")
+    film_x: Number = _adds("X")
+    film_y: Number = _adds("Y")
+    film_z: Number = _adds("Z")
 
     @property
     def rules(self) -> Dialect:
         """What its program does."""
         return DIALECTS[self.dialect]
+
+    def below(self, n: Scalar) -> "Engine":
+        """The same, with what turns the interference of a film to channels: it is colours as others are, not a matrix in the formula."""
+        if self.film_nm is None:
+            return self
+        x, y, z = to_rgb(jnp.asarray(self.film_nm).dtype)
+        return replace(self, film_x=x, film_y=y, film_z=z)
 
     def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
         """BRDF [1/sr] of directions above the surface."""
@@ -70,7 +90,7 @@ class Engine(Surface):
         if self.coat_alpha is None:
             return base
         F = self._dielectric_reflectance(c, self._index)
-        boost = self._compensation(wo[2], self.coat_alpha, F)
+        boost = self._compensation(wo[2], self.coat_alpha, F) if self.rules.compensates == "lobes" else 1.0
         coat = F * boost * density("ggx", h, self.coat_alpha) * self._coat_visibility(wi, wo, c)
         return coat + base * self._passed(wi, wo, c, boost)
 
@@ -78,21 +98,23 @@ class Engine(Surface):
         """What lies below the coat, on its own."""
         if self.base == "diffuse":
             return self.base_color / jnp.pi * self._beside(wo, WIDE, 0.0)
-        F = self._dielectric_reflectance(c, self.ior) if self.base == "glossy" else self._metal_reflectance(c)
-        boost = self._compensation(wo[2], self._mean_width, F)
+        F = self._base_reflectance(wo, c)
+        boost = self._base_compensation(wo[2], F)
         hidden = self._mean_width if self.rules.masks_evenly else self._base_width
         lobe = F * boost * density("ggx", h, self._base_width) * visibility("smith", "ggx", wi, wo, hidden)
         if self.base == "metal":
             return lobe
         if self.base == "mixed":
             diffuse = self.base_color / jnp.pi * self._beside(wo, self._mean_width, 0.0)
+            if self.rules.metal_dims:
+                diffuse = diffuse * (1.0 - self.metallic * self._schlick(c, 0.0))
             return lobe * self.metallic + diffuse * (1.0 - self.metallic)
         kept = self._beside(wo, self._mean_width, dielectric_f0(self.ior), boost) if self.rules.exact else 1.0 - F
         return lobe + self.base_color / jnp.pi * (kept if self.rules.layered else 1.0)
 
     def _beside(self, wo: Vec3, alpha: Any, f0: Any, boost: Any = 1.0) -> Any:
         """Part of the light that a dielectric lobe leaves to the diffuse part; MaterialX counts a lobe of no reflectance at the normal, too."""
-        if not self.rules.compensates and isinstance(f0, float):
+        if self.rules.compensates != "lobes" and isinstance(f0, float):
             return 1.0
         return 1.0 - directional_albedo(wo[2], alpha, f0) * boost
 
@@ -114,7 +136,7 @@ class Engine(Surface):
 
     def _metal_reflectance(self, c: Scalar) -> Any:
         """Schlick 1994, with the dip before grazing angles where there is an edge tint (Hoffman 2019; Kutz et al. 2021, eq. 12)."""
-        F = fresnel_schlick(c, self.base_color)
+        F = self._schlick(c, self.base_color)
         if self.edge_tint is None:
             return F
         dip = fresnel_schlick(jnp.asarray(GRAZING), self.base_color) * (1.0 - self.edge_tint) / (GRAZING * (1.0 - GRAZING) ** 6)
@@ -124,8 +146,23 @@ class Engine(Surface):
     def _index(self) -> Any:
         return jnp.asarray(COAT_INDEX, self.coat_alpha.dtype) if self.coat_ior is None else self.coat_ior
 
+    def _base_reflectance(self, wo: Vec3, c: Scalar) -> Any:
+        if self.base == "glossy":
+            return self._dielectric_reflectance(c, self.ior)
+        if self.film_nm is None:
+            return self._metal_reflectance(c)
+        at = wo[2] if self.rules.film == "view" else c
+        rgb = (self.film_x, self.film_y, self.film_z)
+        return filmed_reflectance(at, self.film_nm, self.film_eta, self.base_color, rgb, self._schlick)
+
+    def _schlick(self, c: Scalar, f0: Any) -> Any:
+        """Schlick 1994, or with 2^((-5.55473 c - 6.98316) c) for (1 - c)^5 (Lagarde 2012)."""
+        if not self.rules.gaussian:
+            return fresnel_schlick(c, f0)
+        return f0 + (1.0 - f0) * jnp.exp2((-5.55473 * c - 6.98316) * c)
+
     def _dielectric_reflectance(self, c: Scalar, eta: Any) -> Any:
-        return fresnel_dielectric(c, eta) if self.rules.exact else fresnel_schlick(c, dielectric_f0(eta))
+        return fresnel_dielectric(c, eta) if self.rules.exact else self._schlick(c, dielectric_f0(eta))
 
     def _coat_visibility(self, wi: Vec3, wo: Vec3, c: Scalar) -> Any:
         """G / (4 NoL NoV): Smith's, or the short one of Kelemen and Szirmay-Kalos 2001."""
@@ -158,10 +195,16 @@ class Engine(Surface):
         K = 1.0 - (1.0 - dielectric_f0(self._index)) / (self._index * self._index)
         return (1.0 - K) / (1.0 - self.base_color * K)
 
+    def _base_compensation(self, NoV: Scalar, F: Any) -> Any:
+        """What the lobe of the base, of the reflectance F, is scaled by."""
+        if self.rules.compensates != "base":
+            return self._compensation(NoV, self._mean_width, F) if self.rules.compensates else 1.0
+        f0 = dielectric_f0(self.ior) if self.base == "glossy" else self.base_color
+        across = self.alpha if self.alpha_x is None else jnp.minimum(self.alpha_x, self.alpha_y)
+        return self._compensation(NoV, across, f0 * self.metallic if self.base == "mixed" else f0)
+
     def _compensation(self, NoV: Scalar, alpha: Any, F: Any) -> Any:
-        """What a lobe is scaled by for light that meets several facets (Turquin 2019, eq. 16); 1 where a program leaves it out."""
-        if not self.rules.compensates:
-            return 1.0
+        """What a lobe is scaled by for light that meets several facets (Turquin 2019, eq. 16)."""
         single = directional_albedo(NoV, alpha, 1.0)
         return 1.0 + F * (1.0 - single) / single
 

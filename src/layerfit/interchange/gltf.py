@@ -13,7 +13,9 @@ from . import words
 from .convert import Conversion
 from .engine import Engine
 
-CLEARCOAT, IOR, SPECULAR, ANISOTROPY = (f"KHR_materials_{name}" for name in ("clearcoat", "ior", "specular", "anisotropy"))
+CLEARCOAT, IOR, SPECULAR, ANISOTROPY, IRIDESCENCE = (
+    f"KHR_materials_{name}" for name in ("clearcoat", "ior", "specular", "anisotropy", "iridescence")
+)
 SEGMENTS, RINGS = 48, 24
 """Of the sphere that the material is put on."""
 
@@ -48,6 +50,15 @@ def material(engine: Engine, name: str) -> dict[str, Any]:
             extensions[ANISOTROPY]["anisotropyRotation"] = words.digits(0.5 * math.pi)
     if engine.coat_alpha is not None:
         extensions[CLEARCOAT] = {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": words.roughness(engine.coat_alpha)}
+    if engine.film_nm is not None:
+        film = {
+            "Ior": engine.film_eta,
+            "ThicknessMinimum": 0.0,
+            "ThicknessMaximum": engine.film_nm,
+        }  # the maximum holds without a texture
+        extensions[IRIDESCENCE] = {"iridescenceFactor": 1.0} | {
+            f"iridescence{key}": words.digits(value) for key, value in film.items()
+        }
     made: dict[str, Any] = {"name": name, "pbrMetallicRoughness": metallic_roughness}
     return made | ({"extensions": extensions} if extensions else {})
 
@@ -115,7 +126,9 @@ def engine_of(made: Any, where: str) -> Engine:
     """The coat over a base of an entry of "materials"."""
     basic = _table(made, "pbrMetallicRoughness", where)
     extensions = _table(made, "extensions", where)
-    coat, ior, specular, grain = (_table(extensions, name, where) for name in (CLEARCOAT, IOR, SPECULAR, ANISOTROPY))
+    coat, ior, specular, grain, film = (
+        _table(extensions, name, where) for name in (CLEARCOAT, IOR, SPECULAR, ANISOTROPY, IRIDESCENCE)
+    )
     number = lambda table, key, default: _number(table, key, default, where)  # noqa: E731
     metallic = number(basic, "metallicFactor", 1.0)
     coated = number(coat, "clearcoatFactor", 0.0) > 0.0
@@ -124,6 +137,9 @@ def engine_of(made: Any, where: str) -> Engine:
     alpha = words.width(number(basic, "roughnessFactor", 1.0))
     if kind == "mixed":
         found["metallic"] = metallic
+    if kind == "metal" and number(film, "iridescenceFactor", 0.0) > 0.0:
+        found["film_nm"] = float(np.clip(number(film, "iridescenceThicknessMaximum", 400.0), 0.0, 2000.0))
+        found["film_eta"] = float(np.clip(number(film, "iridescenceIor", 1.3), 1.0, 3.0))
     if kind == "glossy":
         found["ior"] = float(np.clip(number(ior, "ior", 1.5), 1.0, 3.0))
     if strength := number(grain, "anisotropyStrength", 0.0):

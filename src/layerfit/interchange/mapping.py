@@ -45,6 +45,15 @@ def copied(stack: Stack, dialect: str) -> Engine:
     return engine
 
 
+def filmed(stack: Stack, engine: Engine) -> Engine | None:
+    """A copy with the film of its metal, where there is one and the program has a word for it: the metal's own reflectance below it."""
+    base = stack.base
+    if engine.rules.film is None or engine.base != "metal" or not isinstance(base, Conductor) or base.film_nm is None:
+        return None
+    bare = copied(replace(stack, base=replace(base, film_nm=None, film_eta=None)), engine.dialect)
+    return replace(bare, film_nm=_number(base.film_nm), film_eta=_number(base.film_eta))
+
+
 def _absorbing(engine: Engine, tau: np.ndarray) -> Engine:
     """With the depth of its coat, or what that takes of the base's colour where the coat cannot absorb."""
     if not tau.any():
@@ -108,7 +117,7 @@ def alone(engine: Engine) -> Stack:
 
 def fitted_fields(engine: Engine) -> tuple[str, ...]:
     """What the best values are searched in: not an index that was copied, nor a colour where a coat's depth has the same effect."""
-    fields = ["alpha", "alpha_x", "alpha_y", "metallic", "coat_alpha", "coat_tau"]
+    fields = ["alpha", "alpha_x", "alpha_y", "metallic", "coat_alpha", "coat_tau", "film_nm"]
     if engine.coat_tau is None or engine.base == "mixed" or (engine.base == "diffuse" and engine.rules.path != "flat"):
         fields.append("base_color")
     return tuple(name for name in fields if getattr(engine, name) is not None)
@@ -124,7 +133,8 @@ def stack_of(engine: Engine) -> Stack:
     widths = {"alpha": engine.alpha, "alpha_x": engine.alpha_x, "alpha_y": engine.alpha_y}
     if metal:
         eta, k = metal_of(_colour(engine.base_color), None if engine.edge_tint is None else _colour(engine.edge_tint))
-        base: Any = Conductor(**widths, eta=np.clip(eta * coat_index, 0.02, 10.0), k=np.clip(k * coat_index, 0.0, 15.0))
+        film = {"film_nm": engine.film_nm, "film_eta": engine.film_eta}
+        base: Any = Conductor(**widths, **film, eta=np.clip(eta * coat_index, 0.02, 10.0), k=np.clip(k * coat_index, 0.0, 15.0))
     elif engine.base == "glossy" and not _colour(engine.base_color).any():
         base = Dielectric(**widths, eta=engine.ior)
     else:

@@ -65,7 +65,7 @@ def three_settings(engine: Engine) -> dict[str, str]:
     """Settings of a MeshPhysicalMaterial, as code; its material is that of glTF."""
     made = gltf.material(engine, "")
     basic, extensions = made["pbrMetallicRoughness"], made.get("extensions", {})
-    coat, grain = extensions.get(gltf.CLEARCOAT, {}), extensions.get(gltf.ANISOTROPY, {})
+    coat, grain, film = (extensions.get(name, {}) for name in (gltf.CLEARCOAT, gltf.ANISOTROPY, gltf.IRIDESCENCE))
     settings: dict[str, Any] = {
         "color": "new THREE.Color().setRGB({:g}, {:g}, {:g})".format(*basic["baseColorFactor"]),
         "metalness": basic["metallicFactor"],
@@ -74,6 +74,9 @@ def three_settings(engine: Engine) -> dict[str, str]:
         "ior": extensions.get(gltf.IOR, {}).get("ior"),
         "anisotropy": grain.get("anisotropyStrength"),
         "anisotropyRotation": grain.get("anisotropyRotation"),
+        "iridescence": film.get("iridescenceFactor"),
+        "iridescenceIOR": film.get("iridescenceIor"),
+        "iridescenceThicknessRange": "[0, {iridescenceThicknessMaximum:g}]".format(**film) if film else None,
         "clearcoat": coat.get("clearcoatFactor"),
         "clearcoatRoughness": coat.get("clearcoatRoughnessFactor"),
     }
