@@ -33,7 +33,11 @@ void main() {
 //@ if cosines
     vec2 lean = v_wi.xy + v_wo.xy;
     color = vec4(lf_shade(v_wi.z, v_wo.z, dot(lean, lean)) * v_weight, 1.0);
-//@ else
+//@ end
+//@ if tangent
     color = vec4(lf_evaluate(v_wi, v_wo@THERE@) * v_weight, 1.0);
+//@ end
+//@ if free
+    color = vec4(lf_evaluate(vec4(v_wi.xy, 0.0, v_wi.z), vec4(v_wo.xy, 0.0, v_wo.z)@THERE@) * v_weight, 1.0);
 //@ end
 }

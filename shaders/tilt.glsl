@@ -5,7 +5,7 @@ vec3 lf_tilted(vec3 n, vec3 t, vec2 slopes) {
     return normalize(slopes.x * x + slopes.y * cross(n, x) + n);
 }
 //@ else
-// The normal along (slopes, 1) in the frame that lf_brdf makes of n alone.
+// The normal along (slopes, 1) in a frame of n alone (Duff et al. 2017).
 vec3 lf_tilted(vec3 n, vec2 slopes) {
     float s = n.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (s + n.z);

@@ -30,7 +30,7 @@ LADDER = [
 BRANCHES = [
     [{"capture"}, {"fit"}],
     [
-        {"shader.glsl", "shader.helpers", "shader.names"},
+        {"shader.bounds", "shader.glsl", "shader.helpers", "shader.names"},
         {"shader.primitives"},
         {"shader.printer"},
         {"shader.export", "shader.program"},

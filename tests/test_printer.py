@@ -16,6 +16,7 @@ from layerfit._types import Scalar, Vec3
 from layerfit.layers import LAYERS
 from layerfit.optics.hashing import hash_cell, unit
 from layerfit.preset import MODELS, read_preset
+from layerfit.shader.bounds import ANY
 from layerfit.shader.export import print_material
 from layerfit.shader.gl import shade_points
 from layerfit.shader.glsl import PrintError, literal
@@ -34,7 +35,7 @@ def run_both(fn, *columns):
     example = jnp.zeros(3, jnp.float32)
     names = ["abc"[k] for k in range(len(columns))]
     whole = lambda *args: jnp.broadcast_to(fn(*args), (3,)).astype(jnp.float32)  # noqa: E731
-    printer.function(whole, "lf_test", [], [(example, name) for name in names])
+    printer.function(whole, "lf_test", [], [(example, name, ANY) for name in names])
     source = "#version 330 core\n" + printer.structs_text() + printer.functions_text()
     source += "".join(f"in vec3 v_{name};\n" for name in names)
     source += f"out vec4 color;\nvoid main() {{ color = vec4(lf_test({', '.join(f'v_{n}' for n in names)}), 1.0); }}\n"
@@ -298,7 +299,7 @@ def test_the_text_reads_as_written_by_hand():
 
 def test_what_a_material_does_without_is_not_in_its_text():
     clear = print_material(STACKS["corrected, clear coat"], "clear").text()
-    assert "exp(" not in clear.split("lf_evaluate(vec3 wi")[1].split("lf_brdf")[0]
+    assert "exp(" not in clear.split("lf_evaluate(vec4 wi")[1].split("lf_brdf")[0]
     assert "tau" not in clear
     assert "anisotropic" not in clear
     bare = print_material(STACKS["lambert"], "paper").text()
@@ -313,12 +314,12 @@ def test_guards_are_plain_operations():
 
 def test_an_unknown_primitive_names_the_line():
     with pytest.raises(PrintError, match=r"test_printer\.py:\d+.*'cumsum'"):
-        Printer(CHUNKS).function(lambda a: jnp.cumsum(a), "lf_test", [], [(jnp.zeros(3, jnp.float32), "a")])
+        Printer(CHUNKS).function(lambda a: jnp.cumsum(a), "lf_test", [], [(jnp.zeros(3, jnp.float32), "a", ANY)])
 
 
 def test_a_shape_that_glsl_has_not_is_refused():
     with pytest.raises(PrintError, match="shape"):
-        Printer(CHUNKS).function(lambda a: jnp.sum(jnp.outer(a, a), 0), "lf_test", [], [(jnp.zeros(3, jnp.float32), "a")])
+        Printer(CHUNKS).function(lambda a: jnp.sum(jnp.outer(a, a), 0), "lf_test", [], [(jnp.zeros(3, jnp.float32), "a", ANY)])
 
 
 def test_two_chunks_of_one_name_are_refused():

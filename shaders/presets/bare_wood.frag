@@ -31,28 +31,31 @@ float lf_atan2(float y, float x) {
 }
 
 // Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection.
-vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
+vec3 lf_oren_nayar_full(vec4 wi, vec4 wo, vec3 albedo, float sigma) {
     float sigma2 = sigma * sigma;
     float c1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33);
     float c2 = 0.45 * sigma2 / (sigma2 + 0.09);
     float c3 = 0.125 * sigma2 / (sigma2 + 0.09);
     float c4 = 0.17 * sigma2 / (sigma2 + 0.13);
-    float sin_i = sqrt(max(wi.x * wi.x + wi.y * wi.y, 0.0));
-    float sin_o = sqrt(max(wo.x * wo.x + wo.y * wo.y, 0.0));
-    float elevation_i = lf_atan2(wi.z, sin_i) * 0.63661975;
-    float elevation_o = lf_atan2(wo.z, sin_o) * 0.63661975;
+    float sin_i = sqrt(dot(wi.xyz, wi.xyz));
+    float sin_o = sqrt(dot(wo.xyz, wo.xyz));
+    float elevation_i = lf_atan2(wi.w, sin_i) * 0.63661975;
+    float elevation_o = lf_atan2(wo.w, sin_o) * 0.63661975;
     float higher = max(elevation_i, elevation_o);
-    float lower_cos = min(wi.z, wo.z);
-    float larger_cos = max(wi.z, wo.z);
+    float lower_cos = min(wi.w, wo.w);
+    float larger_cos = max(wi.w, wo.w);
     float larger_sin = max(sin_i, sin_o);
-    float dot_xy = wi.x * wo.x + wi.y * wo.y;
+    float dot_xy = dot(wi.xyz, wo.xyz);
     float cos_phi = dot_xy / max(sin_i * sin_o, 1e-14);
-    float sin_phi = (wi.x * wo.y - wi.y * wo.x) / max(sin_i * sin_o, 1e-14);
-    float aside = sin_phi * sin_phi / (1.0 + abs(cos_phi));
+    vec3 azimuth_i = wi.xyz / max(sin_i, 1e-14);
+    vec3 azimuth_o = wo.xyz / max(sin_o, 1e-14);
+    bool facing = dot_xy < 0.0;
+    vec3 apart = azimuth_i + (facing ? azimuth_o : (-azimuth_o));
+    float aside = 0.5 * dot(apart, apart);
     float forward = dot_xy / larger_cos;
     float gap = higher * (3.0 - higher * (3.0 - higher)) - lower_cos * lower_cos / (1.0 + larger_sin);
     float backward = dot_xy * gap / max(larger_cos * larger_sin, 1e-14);
-    float tan_mean = (sin_i + sin_o) / (wi.z + wo.z);
+    float tan_mean = (sin_i + sin_o) / (wi.w + wo.w);
     float smaller = 1.0 - higher;
     float product = smaller * (1.0 - min(elevation_i, elevation_o));
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
@@ -61,22 +64,18 @@ vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
     return albedo / 3.1415927 * max(direct + albedo * interreflected, 0.0);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
-    return lit ? lf_oren_nayar_full(wi, wo, lf_wood.albedo, lf_wood.sigma) : vec3(0.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
+    vec3 value = lf_oren_nayar_full(wi, wo, lf_wood.albedo, lf_wood.sigma);
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

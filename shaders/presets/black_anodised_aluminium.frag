@@ -87,25 +87,25 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.011929512, 0.011332409, 0.010220431),           // c0: coefficients of the powers of the curves' argument
-    vec3(0.00090171606, 0.0008755652, 0.0008256263),       // c1: 
-    vec3(-0.00021067634, -0.00018694066, -0.00014502555),  // c2: 
-    vec3(0.0014103726, 0.0013503134, 0.0012379326),        // c3: 
-    vec3(-0.0014883019, -0.001412034, -0.0012701824),      // c4: 
-    vec3(-0.0033545047, -0.0031982958, -0.0029074848),     // c5: 
-    vec3(0.00069625676, 0.0006603226, 0.0005936101),       // c6: 
-    vec3(0.001615949, 0.0015408471, 0.0014010668)          // c7: 
+    vec3(0.011929514, 0.011332409, 0.010220429),           // c0: coefficients of the powers of the curves' argument
+    vec3(0.00090171956, 0.00087556755, 0.0008256226),      // c1: 
+    vec3(-0.00021067727, -0.00018693507, -0.00014501996),  // c2: 
+    vec3(0.0014103465, 0.0013502911, 0.0012379624),        // c3: 
+    vec3(-0.0014883056, -0.0014120378, -0.001270175),      // c4: 
+    vec3(-0.0033544824, -0.0031982213, -0.0029075593),     // c5: 
+    vec3(0.00069625676, 0.0006603338, 0.0005936064),       // c6: 
+    vec3(0.0016159266, 0.0015408173, 0.0014010966)         // c7: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.22969471, 0.22803955, 0.22248548),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.008985236, -0.008828983, -0.008387461),    // c1: 
-    vec3(-0.0020988137, -0.0018032193, -0.001221016),  // c2: 
-    vec3(0.020865142, 0.020923316, 0.02084905),        // c3: 
-    vec3(-0.03589511, -0.0359239, -0.03562641),        // c4: 
-    vec3(-0.06489682, -0.06491673, -0.06434202),       // c5: 
-    vec3(0.018824637, 0.018769264, 0.018469512),       // c6: 
-    vec3(0.037253022, 0.037225127, 0.036806226)        // c7: 
+    vec3(0.22969471, 0.22803953, 0.22248548),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.008985117, -0.008829072, -0.008387335),     // c1: 
+    vec3(-0.0020988733, -0.0018028617, -0.0012210459),  // c2: 
+    vec3(0.020863712, 0.020923734, 0.0208475),          // c3: 
+    vec3(-0.03589475, -0.035924852, -0.03562635),       // c4: 
+    vec3(-0.06489444, -0.06491935, -0.0643394),         // c5: 
+    vec3(0.018824518, 0.018769741, 0.018469572),        // c6: 
+    vec3(0.03725159, 0.03722608, 0.036804795)           // c7: 
 );
 
 const Interface lf_oxide_across = Interface(
@@ -161,23 +161,22 @@ Interface lf_mixed(Interface tangent, Interface across, float share) {
 
 // Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
 float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+    return sqrt(max(tilt + (1.0 - tilt) * (w.z * w.z), 0.0));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -198,41 +197,41 @@ Crossing lf_pass_interface(Interface interface_, float eta, vec2 alpha, vec3 w) 
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
     float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    float sine = sqrt(dot(w.xy, w.xy));
     bend = min(bend, 0.9998 / max(sine, 1e-06));
     sine = sine * bend;
     float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
     vec2 a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
-    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+    return Crossing(vec3(w.xy * bend, z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // Anisotropic GGX density of facet normals (Burley 2012, eq. 13).
@@ -247,7 +246,7 @@ float lf_ggx_d_anisotropic(vec3 h, float alpha_x, float alpha_y) {
 float lf_ggx_projection_anisotropic(vec3 w, float alpha_x, float alpha_y) {
     float x = alpha_x * w.x;
     float y = alpha_y * w.y;
-    return sqrt(max(w.z * w.z + x * x + y * y, 0.0));
+    return sqrt(w.z * w.z + x * x + y * y);
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -267,12 +266,11 @@ vec3 lf_lean(Crossing x, Crossing i, Crossing o, vec2 alpha) {
     vec2 own = pow(max(x.a, 1e-30), vec2(1.412));
     vec2 total = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.412)) + pow(max(i.a, 1e-30), vec2(1.412)) + pow(max(o.a, 1e-30), vec2(1.412));
     vec2 turn = 0.7504 * own / total;
-    float y0 = x.w.x - turn.x * (i.w.x + o.w.x);
-    float y1 = x.w.y - turn.y * (i.w.y + o.w.y);
-    float sine = sqrt(max(y0 * y0 + y1 * y1, 0.0));
+    vec2 y = x.w.xy - turn * (i.w.xy + o.w.xy);
+    float sine = sqrt(dot(y, y));
     float held = min(1.0, 0.9998 / max(sine, 1e-06));
     sine = min(sine, 0.9998);
-    return vec3(y0 * held, y1 * held, sqrt(max((1.0 - sine) * (1.0 + sine), 0.0)));
+    return vec3(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
 }
 
 // Part of the path's spread that counts, by the base's share of the width.
@@ -297,29 +295,31 @@ vec3 lf_projected(float path, float theta, vec3 tau) {
     return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
 }
 
+// The cosine between either direction and their half vector.
+float lf_half_cosine2(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    float s2 = dot(s, s);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+}
+
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // 0 where the indices match and there is no interface, 1 from the first index of the tables on.
 float lf_presence(float eta) {
-    float t = max((eta - 1.0) / 0.15, 0.0);
-    t = min(t, 1.0);
-    return t * (2.0 - t);
+    return 2.0 - 1.0;
 }
 
 // Lambda of the GGX distribution (Heitz 2014, eq. 72).
@@ -335,19 +335,17 @@ float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, vec2 alpha, vec2 masked)
     float M = yi.z + yo.z;
     float M2 = M * M;
     vec2 spread = pow(max(i.a, 1e-30), vec2(1.412)) + pow(max(o.a, 1e-30), vec2(1.412));
-    vec2 width2 = pow(max(pow(max(alpha * M, 1e-30), vec2(1.412)) + spread, 1e-30), vec2(1.4164306));
+    vec2 width2 = pow(pow(alpha * M, vec2(1.412)) + spread, vec2(1.4164306));
     vec2 own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float size = sqrt(max(width2.x * width2.y, 0.0));
-    float r = max(1.0 + 0.3271 * (size / sqrt(max(own2.x * own2.y, 0.0)) - 1.0), 0.6);
+    float size = sqrt(width2.x * width2.y);
+    float r = 1.0 + 0.3271 * (size / sqrt(own2.x * own2.y) - 1.0);
     r = min(r, 4.0);
     float log_r = log(r);
     float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
-    float X0 = i.w.x + o.w.x;
-    float X1 = i.w.y + o.w.y;
-    float v = X0 * X0 / width2.x + X1 * X1 / width2.y;
-    float Y0 = yi.x + yo.x;
-    float Y1 = yi.y + yo.y;
-    float tilt = 1.0 + (Y0 * Y0 + Y1 * Y1) / M2;
+    vec2 t = i.w.xy + o.w.xy;
+    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
+    vec2 Y = yi.xy + yo.xy;
+    float tilt = 1.0 + dot(Y, Y) / M2;
     float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
     return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * size * (1.0 + v * (b + r * v)));
 }
@@ -355,25 +353,23 @@ float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, vec2 alpha, vec2 masked)
 // The polynomial at s; an energy is never below 0.
 vec3 lf_amount(Curve curve, float s) {
     vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper)));
 }
 
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 vec2 lf_wider(vec2 alpha, vec2 coat_alpha) {
-    return pow(max(2.0 * pow(max(alpha, 1e-30), vec2(1.412)) + 0.5751 * pow(max(coat_alpha, 1e-30), vec2(1.412)), 1e-30), vec2(0.7082153));
+    return pow(2.0 * pow(alpha, vec2(1.412)) + 0.5751 * pow(coat_alpha, vec2(1.412)), vec2(0.7082153));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * (i.w.x * o.w.x + i.w.y * o.w.y);
-    return max(1.0 - (1.0 - min(alpha, 1.0)) * back, 0.0) / 3.1415927;
+    float back = eta * eta * dot(i.w.xy, o.w.xy);
+    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
 vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    bool lit = min(wi.z, wo.z) > 0.0;
     Interface interface_ = lf_mixed(lf_oxide_interface, lf_oxide_across, lf_share_along(wi));
     Crossing crossing = lf_pass_interface(interface_, lf_oxide.eta, vec2(lf_oxide.alpha_x, lf_oxide.alpha_y), wi);
     interface_ = lf_mixed(lf_oxide_interface, lf_oxide_across, lf_share_along(wo));
@@ -399,15 +395,16 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     part = lf_direct(share, 0.3096, 0.2662, 1.772);
     path = lf_between(yo, crossing2, part);
     U = U * lf_projected(path, part * crossing2.theta, lf_oxide.tau);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(yi, yo), lf_aluminium.eta, lf_aluminium.k);
-    float even = sqrt(max(0.5 * (lf_oxide.alpha_x * lf_oxide.alpha_x + lf_oxide.alpha_y * lf_oxide.alpha_y), 0.0));
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_aluminium.eta, lf_aluminium.k);
+    float even = sqrt(0.5 * (lf_oxide.alpha_x * lf_oxide.alpha_x + lf_oxide.alpha_y * lf_oxide.alpha_y));
     float rise = 1.0 + 0.3036 * lf_presence(lf_oxide.eta) * even * even * share;
     float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, own, own);
     vec3 again = 0.5 * F2 * (lf_amount(lf_oxide_again, crossing.s) + lf_amount(lf_oxide_again, crossing2.s));
     vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(own, top), own);
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, sqrt(max(0.5 * (lf_aluminium.alpha_x * lf_aluminium.alpha_x + lf_aluminium.alpha_y * lf_aluminium.alpha_y), 0.0)));
-    return lit ? F * D * V + throughput * A * (F2 * U * lobes2 + rest) : vec3(0.0);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, sqrt(0.5 * (lf_aluminium.alpha_x * lf_aluminium.alpha_x + lf_aluminium.alpha_y * lf_aluminium.alpha_y)));
+    vec3 value = F * D * V + throughput * A * (F2 * U * lobes2 + rest);
+    return lit ? value : vec3(0.0);
 }
 
 // BRDF [1/sr] in any frame; t is a tangent, along which alpha_x is measured.

@@ -47,7 +47,7 @@ struct Curve {
 };
 
 struct Crossing {
-    vec3 w;       // median direction
+    vec4 w;       // median direction
     float T;      // energy that passes
     float a;      // spread, as a width
     float path;   // mean path, in thicknesses
@@ -83,25 +83,25 @@ const Conductor lf_silver = Conductor(
 );
 
 const Curve lf_glass_again = Curve(
-    vec3(0.0038955081, 0.013052014, 0.0974224),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0001632435, -0.000724623, -0.006919913),  // c1: 
-    vec3(0.0024450268, 0.007881692, 0.048319347),     // c2: 
-    vec3(0.0056150034, 0.018423636, 0.11570987),      // c3: 
-    vec3(-0.00683129, -0.022907589, -0.15350464),     // c4: 
-    vec3(-0.014042523, -0.046539173, -0.2998429),     // c5: 
-    vec3(0.004613322, 0.015405316, 0.10258183),       // c6: 
-    vec3(0.008848667, 0.029262625, 0.18792772)        // c7: 
+    vec3(0.0038955086, 0.013052015, 0.097422406),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.00016324327, -0.0007246253, -0.0069199167),  // c1: 
+    vec3(0.002445018, 0.007881675, 0.048319273),         // c2: 
+    vec3(0.005614992, 0.018423669, 0.11570981),          // c3: 
+    vec3(-0.0068312623, -0.022907536, -0.15350443),      // c4: 
+    vec3(-0.014042489, -0.046539158, -0.29984277),       // c5: 
+    vec3(0.0046133054, 0.015405282, 0.10258162),         // c6: 
+    vec3(0.0088486485, 0.02926261, 0.18792737)           // c7: 
 );
 
 const Curve lf_glass_rest = Curve(
-    vec3(0.2218301, 0.32766622, 0.7327888),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.029395536, -0.039315462, -0.07268235),  // c1: 
-    vec3(0.04434569, 0.042232335, 0.01926279),      // c2: 
-    vec3(0.19991064, 0.21983385, 0.23053408),       // c3: 
-    vec3(-0.12415075, -0.13390028, -0.16359258),    // c4: 
-    vec3(-0.42811036, -0.4746325, -0.54333925),     // c5: 
-    vec3(0.07025772, 0.0754779, 0.09051132),        // c6: 
-    vec3(0.24533737, 0.2718482, 0.3092873)          // c7: 
+    vec3(0.2218301, 0.32766616, 0.7327889),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.029395588, -0.039315373, -0.07268259),  // c1: 
+    vec3(0.0443459, 0.042232543, 0.019262612),      // c2: 
+    vec3(0.19991082, 0.21983266, 0.23053503),       // c3: 
+    vec3(-0.12415147, -0.13390052, -0.1635921),     // c4: 
+    vec3(-0.42811108, -0.47463202, -0.54334116),    // c5: 
+    vec3(0.07025808, 0.07547802, 0.09051061),       // c6: 
+    vec3(0.24533713, 0.27184772, 0.30928683)        // c7: 
 );
 
 // log(1 + x) without the cancellation near 0.
@@ -119,23 +119,22 @@ vec3 lf_log1p(vec3 x) {
 
 // Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+float lf_facet_cosine(vec4 w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -150,59 +149,59 @@ float lf_curve(vec4 low, vec4 high, float s) {
 }
 
 // Follow one direction through the coat's rough top.
-Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w) {
-    float s = lf_grazing(w.z);
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w) {
+    float s = lf_grazing(w.w);
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
     float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    float sine = sqrt(dot(w.xyz, w.xyz));
     bend = min(bend, 0.9998 / max(sine, 1e-06));
     sine = sine * bend;
     float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
-    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -212,21 +211,20 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 
 // Part of a lobe's width, as a power, that is due to the base.
 float lf_base_share(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), 1.412);
+    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412);
     return base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec3 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
+vec4 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
     float own = pow(max(x.a, 1e-30), 1.412);
-    float total = pow(max(alpha * (i.w.z + o.w.z), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
+    float total = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
     float turn = 0.7504 * own / total;
-    float y0 = x.w.x - turn * (i.w.x + o.w.x);
-    float y1 = x.w.y - turn * (i.w.y + o.w.y);
-    float sine = sqrt(max(y0 * y0 + y1 * y1, 0.0));
+    vec3 y = x.w.xyz - turn * (i.w.xyz + o.w.xyz);
+    float sine = sqrt(dot(y, y));
     float held = min(1.0, 0.9998 / max(sine, 1e-06));
     sine = min(sine, 0.9998);
-    return vec3(y0 * held, y1 * held, sqrt(max((1.0 - sine) * (1.0 + sine), 0.0)));
+    return vec4(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
 }
 
 // Part of the path's spread that counts, by the base's share of the width.
@@ -235,8 +233,8 @@ float lf_direct(float share, float d, float c, float e) {
 }
 
 // Mean path of light that the base sends on: between that of one direction and that of all that cross.
-float lf_between(vec3 y, Crossing x, float part) {
-    float straight = 1.0 / y.z;
+float lf_between(vec4 y, Crossing x, float part) {
+    float straight = 1.0 / y.w;
     return straight + part * (x.path - straight);
 }
 
@@ -251,55 +249,55 @@ vec3 lf_projected(float path, float theta, vec3 tau) {
     return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
 }
 
+// The cosine between either direction and their half vector.
+float lf_half_cosine2(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = dot(s, s);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+}
+
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // 0 where the indices match and there is no interface, 1 from the first index of the tables on.
 float lf_presence(float eta) {
-    float t = max((eta - 1.0) / 0.15, 0.0);
-    t = min(t, 1.0);
-    return t * (2.0 - t);
+    return 2.0 - 1.0;
 }
 
 // Lambda of the GGX distribution (Heitz 2014, eq. 72).
-float lf_smith_lambda(vec3 w, float alpha) {
-    float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
+float lf_smith_lambda(vec4 w, float alpha) {
+    float tan2 = dot(w.xyz, w.xyz) / (w.w * w.w);
     float x = alpha * alpha * tan2;
     return 0.5 * x / (1.0 + sqrt(1.0 + x));
 }
 
 // D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
-float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, float alpha, float masked) {
-    float M = yi.z + yo.z;
+float lf_lobe(Crossing i, Crossing o, vec4 yi, vec4 yo, float alpha, float masked) {
+    float M = yi.w + yo.w;
     float M2 = M * M;
     float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float width2 = pow(max(pow(max(alpha * M, 1e-30), 1.412) + spread, 1e-30), 1.4164306);
+    float width2 = pow(pow(alpha * M, 1.412) + spread, 1.4164306);
     float own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float r = max(1.0 + 0.3271 * (width2 / own2 - 1.0), 0.6);
+    float r = 1.0 + 0.3271 * (width2 / own2 - 1.0);
     r = min(r, 4.0);
     float log_r = log(r);
     float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
-    float X0 = i.w.x + o.w.x;
-    float X1 = i.w.y + o.w.y;
-    float v = (X0 * X0 + X1 * X1) / width2;
-    float Y0 = yi.x + yo.x;
-    float Y1 = yi.y + yo.y;
-    float tilt = 1.0 + (Y0 * Y0 + Y1 * Y1) / M2;
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
+    vec3 Y = yi.xyz + yo.xyz;
+    float tilt = 1.0 + dot(Y, Y) / M2;
     float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
     return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * width2 * (1.0 + v * (b + r * v)));
 }
@@ -312,31 +310,29 @@ vec3 lf_amount(Curve curve, float s) {
 
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 float lf_wider(float alpha, float coat_alpha) {
-    return pow(max(2.0 * pow(max(alpha, 1e-30), 1.412) + 0.5751 * pow(max(coat_alpha, 1e-30), 1.412), 1e-30), 0.7082153);
+    return pow(2.0 * pow(alpha, 1.412) + 0.5751 * pow(coat_alpha, 1.412), 0.7082153);
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * (i.w.x * o.w.x + i.w.y * o.w.y);
-    return max(1.0 - (1.0 - min(alpha, 1.0)) * back, 0.0) / 3.1415927;
+    float back = eta * eta * dot(i.w.xyz, o.w.xyz);
+    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     Crossing crossing = lf_pass_interface(lf_glass_interface, lf_glass.eta, lf_glass.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_glass_interface, lf_glass.eta, lf_glass.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_glass.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_glass.alpha);
     float projection_i = lf_ggx_projection(wi, lf_glass.alpha);
     float projection_o = lf_ggx_projection(wo, lf_glass.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_glass.eta * lf_glass.eta);
     float share = lf_base_share(crossing, crossing2, lf_silver.alpha);
-    vec3 yi = lf_lean(crossing, crossing, crossing2, lf_silver.alpha);
-    vec3 yo = lf_lean(crossing2, crossing, crossing2, lf_silver.alpha);
+    vec4 yi = lf_lean(crossing, crossing, crossing2, lf_silver.alpha);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, lf_silver.alpha);
     float part = lf_direct(share, 0.3296, 0.3522, 1.803);
     vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_glass.tau);
     part = lf_direct(share, 0.3096, 0.2662, 1.772);
@@ -347,24 +343,22 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     part = lf_direct(share, 0.3096, 0.2662, 1.772);
     path = lf_between(yo, crossing2, part);
     U = U * lf_projected(path, part * crossing2.theta, lf_glass.tau);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(yi, yo), lf_silver.eta, lf_silver.k);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_silver.eta, lf_silver.k);
     float rise = 1.0 + 0.3036 * lf_presence(lf_glass.eta) * lf_glass.alpha * lf_glass.alpha * share;
     float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, lf_silver.alpha, lf_silver.alpha);
     vec3 again = 0.5 * F2 * (lf_amount(lf_glass_again, crossing.s) + lf_amount(lf_glass_again, crossing2.s));
     vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(lf_silver.alpha, lf_glass.alpha), lf_silver.alpha);
     vec3 root = lf_amount(lf_glass_rest, crossing.s) * lf_amount(lf_glass_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_glass.eta, lf_silver.alpha);
-    return lit ? F * D * V + throughput * A * (F2 * U * lobes2 + rest) : vec3(0.0);
+    vec3 value = F * D * V + throughput * A * (F2 * U * lobes2 + rest);
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

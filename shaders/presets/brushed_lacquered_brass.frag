@@ -85,25 +85,25 @@ const Conductor lf_brass = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.14026329, 0.13573435, 0.12811396),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.014493195, -0.014055347, -0.014592225),  // c1: 
-    vec3(-0.015537187, -0.01598388, -0.01716774),    // c2: 
-    vec3(-0.05080399, -0.051041216, -0.05157441),    // c3: 
-    vec3(-0.042325526, -0.039604813, -0.035563648),  // c4: 
-    vec3(0.059901297, 0.06150192, 0.06317818),       // c5: 
-    vec3(0.034853905, 0.033179462, 0.03112477),      // c6: 
-    vec3(-0.024258435, -0.025235772, -0.0260638)     // c7: 
+    vec3(0.14026329, 0.13573436, 0.12811396),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.014493188, -0.014055347, -0.014592197),  // c1: 
+    vec3(-0.015537135, -0.015983894, -0.017167784),  // c2: 
+    vec3(-0.05080408, -0.051041454, -0.05157438),    // c3: 
+    vec3(-0.042325675, -0.03960505, -0.035563707),   // c4: 
+    vec3(0.059901237, 0.061502635, 0.06317812),      // c5: 
+    vec3(0.034853935, 0.03317955, 0.03112474),       // c6: 
+    vec3(-0.024258435, -0.02523613, -0.02606374)     // c7: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.81476265, 0.6987514, 0.43751994),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.090359345, -0.07973549, -0.058536746),     // c1: 
-    vec3(-0.10216427, -0.09471464, -0.06996894),       // c2: 
-    vec3(-0.059845686, -0.05999267, -0.0453856),       // c3: 
-    vec3(0.011950016, 0.01674378, 0.016967058),        // c4: 
-    vec3(-0.0440588, -0.027076721, -0.012820482),      // c5: 
-    vec3(-0.0005021095, -0.0027430058, -0.002248168),  // c6: 
-    vec3(0.041252375, 0.031652927, 0.020432115)        // c7: 
+    vec3(0.8147626, 0.69875133, 0.43752003),            // c0: coefficients of the powers of the curves' argument
+    vec3(-0.090359345, -0.07973543, -0.05853676),       // c1: 
+    vec3(-0.10216439, -0.094714284, -0.06996918),       // c2: 
+    vec3(-0.059845686, -0.059993982, -0.045384884),     // c3: 
+    vec3(0.01195097, 0.016742468, 0.016967535),         // c4: 
+    vec3(-0.044057846, -0.02707386, -0.012820959),      // c5: 
+    vec3(-0.00050258636, -0.002742052, -0.0022482276),  // c6: 
+    vec3(0.04125142, 0.031652212, 0.020432949)          // c7: 
 );
 
 // log(1 + x) without the cancellation near 0.
@@ -121,23 +121,22 @@ vec3 lf_log1p(vec3 x) {
 
 // Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
 float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+    return sqrt(tilt + (1.0 - tilt) * (w.z * w.z));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -158,53 +157,53 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w)
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
     float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    float sine = sqrt(dot(w.xy, w.xy));
     bend = min(bend, 0.9998 / max(sine, 1e-06));
     sine = sine * bend;
     float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
-    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+    return Crossing(vec3(w.xy * bend, z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
 float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+    float root = alpha / (dot(h.xy, h.xy) + alpha * alpha * (h.z * h.z));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
 float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.z * w.z));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -224,12 +223,11 @@ vec3 lf_lean(Crossing x, Crossing i, Crossing o, vec2 alpha) {
     float own = pow(max(x.a, 1e-30), 1.412);
     vec2 total = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.412)) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
     vec2 turn = 0.7504 * own / total;
-    float y0 = x.w.x - turn.x * (i.w.x + o.w.x);
-    float y1 = x.w.y - turn.y * (i.w.y + o.w.y);
-    float sine = sqrt(max(y0 * y0 + y1 * y1, 0.0));
+    vec2 y = x.w.xy - turn * (i.w.xy + o.w.xy);
+    float sine = sqrt(dot(y, y));
     float held = min(1.0, 0.9998 / max(sine, 1e-06));
     sine = min(sine, 0.9998);
-    return vec3(y0 * held, y1 * held, sqrt(max((1.0 - sine) * (1.0 + sine), 0.0)));
+    return vec3(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
 }
 
 // Part of the path's spread that counts, by the base's share of the width.
@@ -254,29 +252,31 @@ vec3 lf_projected(float path, float theta, vec3 tau) {
     return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
 }
 
+// The cosine between either direction and their half vector.
+float lf_half_cosine2(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    float s2 = dot(s, s);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+}
+
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // 0 where the indices match and there is no interface, 1 from the first index of the tables on.
 float lf_presence(float eta) {
-    float t = max((eta - 1.0) / 0.15, 0.0);
-    t = min(t, 1.0);
-    return t * (2.0 - t);
+    return 2.0 - 1.0;
 }
 
 // Lambda of the GGX distribution (Heitz 2014, eq. 72).
@@ -292,19 +292,17 @@ float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, vec2 alpha, vec2 masked)
     float M = yi.z + yo.z;
     float M2 = M * M;
     float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    vec2 width2 = pow(max(pow(max(alpha * M, 1e-30), vec2(1.412)) + spread, 1e-30), vec2(1.4164306));
+    vec2 width2 = pow(pow(alpha * M, vec2(1.412)) + spread, vec2(1.4164306));
     vec2 own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float size = sqrt(max(width2.x * width2.y, 0.0));
-    float r = max(1.0 + 0.3271 * (size / sqrt(max(own2.x * own2.y, 0.0)) - 1.0), 0.6);
+    float size = sqrt(width2.x * width2.y);
+    float r = 1.0 + 0.3271 * (size / sqrt(own2.x * own2.y) - 1.0);
     r = min(r, 4.0);
     float log_r = log(r);
     float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
-    float X0 = i.w.x + o.w.x;
-    float X1 = i.w.y + o.w.y;
-    float v = X0 * X0 / width2.x + X1 * X1 / width2.y;
-    float Y0 = yi.x + yo.x;
-    float Y1 = yi.y + yo.y;
-    float tilt = 1.0 + (Y0 * Y0 + Y1 * Y1) / M2;
+    vec2 t = i.w.xy + o.w.xy;
+    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
+    vec2 Y = yi.xy + yo.xy;
+    float tilt = 1.0 + dot(Y, Y) / M2;
     float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
     return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * size * (1.0 + v * (b + r * v)));
 }
@@ -317,20 +315,24 @@ vec3 lf_amount(Curve curve, float s) {
 
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 vec2 lf_wider(vec2 alpha, float coat_alpha) {
-    return pow(max(2.0 * pow(max(alpha, 1e-30), vec2(1.412)) + 0.5751 * pow(max(coat_alpha, 1e-30), 1.412), 1e-30), vec2(0.7082153));
+    return pow(2.0 * pow(alpha, vec2(1.412)) + 0.5751 * pow(coat_alpha, 1.412), vec2(0.7082153));
+}
+
+// The polynomial at s; an energy is never below 0.
+vec3 lf_amount2(Curve curve, float s) {
+    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
+    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * (i.w.x * o.w.x + i.w.y * o.w.y);
-    return max(1.0 - (1.0 - min(alpha, 1.0)) * back, 0.0) / 3.1415927;
+    float back = eta * eta * dot(i.w.xy, o.w.xy);
+    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
 vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    bool lit = min(wi.z, wo.z) > 0.0;
     Crossing crossing = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_lacquer.eta);
@@ -353,14 +355,15 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     part = lf_direct(share, 0.3096, 0.2662, 1.772);
     path = lf_between(yo, crossing2, part);
     U = U * lf_projected(path, part * crossing2.theta, lf_lacquer.tau);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(yi, yo), lf_brass.eta, lf_brass.k);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_brass.eta, lf_brass.k);
     float rise = 1.0 + 0.3036 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * share;
     float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, own, own);
     vec3 again = 0.5 * F2 * (lf_amount(lf_lacquer_again, crossing.s) + lf_amount(lf_lacquer_again, crossing2.s));
     vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(own, lf_lacquer.alpha), own);
-    vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, sqrt(max(0.5 * (lf_brass.alpha_x * lf_brass.alpha_x + lf_brass.alpha_y * lf_brass.alpha_y), 0.0)));
-    return lit ? F * D * V + throughput * A * (F2 * U * lobes2 + rest) : vec3(0.0);
+    vec3 root = lf_amount2(lf_lacquer_rest, crossing.s) * lf_amount2(lf_lacquer_rest, crossing2.s);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, sqrt(0.5 * (lf_brass.alpha_x * lf_brass.alpha_x + lf_brass.alpha_y * lf_brass.alpha_y)));
+    vec3 value = F * D * V + throughput * A * (F2 * U * lobes2 + rest);
+    return lit ? value : vec3(0.0);
 }
 
 // BRDF [1/sr] in any frame; t is a tangent, along which alpha_x is measured.

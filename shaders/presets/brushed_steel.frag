@@ -24,31 +24,29 @@ const Conductor lf_steel = Conductor(
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + abs(p)));
     vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // Anisotropic GGX density of facet normals (Burley 2012, eq. 13).
@@ -63,7 +61,7 @@ float lf_ggx_d_anisotropic(vec3 h, float alpha_x, float alpha_y) {
 float lf_ggx_projection_anisotropic(vec3 w, float alpha_x, float alpha_y) {
     float x = alpha_x * w.x;
     float y = alpha_y * w.y;
-    return sqrt(max(w.z * w.z + x * x + y * y, 0.0));
+    return sqrt(w.z * w.z + x * x + y * y);
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -73,15 +71,14 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
 vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    bool lit = min(wi.z, wo.z) > 0.0;
     vec3 F = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_steel.eta, lf_steel.k);
     float D = lf_ggx_d_anisotropic(lf_half_vector(wi, wo), lf_steel.alpha_x, lf_steel.alpha_y);
     float projection_i = lf_ggx_projection_anisotropic(wi, lf_steel.alpha_x, lf_steel.alpha_y);
     float projection_o = lf_ggx_projection_anisotropic(wo, lf_steel.alpha_x, lf_steel.alpha_y);
     float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    return lit ? F * D * V : vec3(0.0);
+    vec3 value = F * D * V;
+    return lit ? value : vec3(0.0);
 }
 
 // BRDF [1/sr] in any frame; t is a tangent, along which alpha_x is measured.

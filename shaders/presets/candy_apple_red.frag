@@ -108,7 +108,7 @@ vec3 lf_erf(vec3 x) {
 // Part of the tilt of flakes that is still drawn flake by flake: 1 near by, 1/2 at `half_distance`, 0 far off.
 float lf_kept_tilt(float distance, float half_distance) {
     float ratio = distance / half_distance;
-    return 1.0 / (1.0 + abs(ratio * ratio));
+    return 1.0 / (1.0 + ratio * ratio);
 }
 
 // Three hashed words of three words (Jarzynski and Olano 2020, listing 5).
@@ -135,32 +135,47 @@ uvec3 lf_hash_cell(vec2 cell, uint seed) {
 // -log(1 - u) for u in (0, 1), with all digits at both ends; `complement` is 1 - u with its own.
 float lf_exponential(float u, float complement) {
     bool small = complement < 1.5258789e-05;
-    float x = small ? complement * 65536.0 : complement;
+    float value = complement * 65536.0;
+    float x = small ? value : complement;
     float halvings = small ? 16.0 : 0.0;
     small = x < 0.00390625;
-    x = small ? x * 256.0 : x;
-    halvings = small ? halvings + 8.0 : halvings;
+    value = x * 256.0;
+    x = small ? value : x;
+    value = halvings + 8.0;
+    halvings = small ? value : halvings;
     small = x < 0.0625;
-    x = small ? x * 16.0 : x;
-    halvings = small ? halvings + 4.0 : halvings;
+    value = x * 16.0;
+    x = small ? value : x;
+    value = halvings + 4.0;
+    halvings = small ? value : halvings;
     small = x < 0.25;
-    x = small ? x * 4.0 : x;
-    halvings = small ? halvings + 2.0 : halvings;
+    value = x * 4.0;
+    x = small ? value : x;
+    value = halvings + 2.0;
+    halvings = small ? value : halvings;
     small = x < 0.5;
-    x = small ? x * 2.0 : x;
-    halvings = small ? halvings + 1.0 : halvings;
+    value = x * 2.0;
+    x = small ? value : x;
+    value = halvings + 1.0;
+    halvings = small ? value : halvings;
     small = x < 0.70710677;
-    x = small ? x * 2.0 : x;
-    halvings = small ? halvings + 1.0 : halvings;
+    value = x * 2.0;
+    x = small ? value : x;
+    value = halvings + 1.0;
+    halvings = small ? value : halvings;
     bool near = u < 0.25;
-    float s = (near ? (-u) : x - 1.0) / (near ? 2.0 - u : x + 1.0);
+    value = x - 1.0;
+    float value2 = x + 1.0;
+    float value3 = 2.0 - u;
+    float s = (near ? (-u) : value) / (near ? value3 : value2);
     float s2 = s * s;
-    float total = abs(0.0 * s2) + 0.11111111;
-    total = abs(total * s2) + 0.14285715;
-    total = abs(total * s2) + 0.2;
-    total = abs(total * s2) + 0.33333334;
-    total = abs(total * s2) + 1.0;
-    return (near ? 0.0 : abs(halvings * 0.6931472)) - 2.0 * (s * total);
+    float total = 0.0 * s2 + 0.11111111;
+    total = total * s2 + 0.14285715;
+    total = total * s2 + 0.2;
+    total = total * s2 + 0.33333334;
+    total = total * s2 + 1.0;
+    value = halvings * 0.6931472;
+    return (near ? 0.0 : value) - 2.0 * (s * total);
 }
 
 // Point of the unit circle, u turns from (1, 0); u in [0, 1].
@@ -168,12 +183,12 @@ vec2 lf_circle(float u) {
     float quarter = floor(4.0 * u + 0.5);
     float x = 6.2831855 * (u - 0.25 * quarter);
     float x2 = x * x;
-    float total = 1.0 - abs(x2 / 90.0);
+    float total = 1.0 - x2 / 90.0;
     total = 1.0 - abs(x2 * total / 56.0);
     total = 1.0 - abs(x2 * total / 30.0);
     total = 1.0 - abs(x2 * total / 12.0);
     total = 1.0 - abs(x2 * total / 2.0);
-    float total2 = 1.0 - abs(x2 / 110.0);
+    float total2 = 1.0 - x2 / 110.0;
     total2 = 1.0 - abs(x2 * total2 / 72.0);
     total2 = 1.0 - abs(x2 * total2 / 42.0);
     total2 = 1.0 - abs(x2 * total2 / 20.0);
@@ -208,40 +223,40 @@ float lf_lost_variance(float distance, float half_distance) {
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
 float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+    float root = alpha / (dot(h.xy, h.xy) + alpha * alpha * (h.z * h.z));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
 float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.z * w.z));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -251,18 +266,17 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 
 // Cosine between a direction and the facets that it meets.
 float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+    return sqrt(tilt + (1.0 - tilt) * (w.z * w.z));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -272,28 +286,27 @@ float lf_with_second_facet(float T, float gain) {
 
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+    float one_minus = dot(w.xy, w.xy) / (1.0 + w.z);
     return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
 vec3 lf_refract_about_normal(vec3 w, float eta) {
     float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
-    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+    return vec3(w.xy, sqrt(z2)) * (1.0 / eta);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
 float lf_slope_spread(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
-    float g = sqrt(max(delta + c * c, 0.0));
-    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
+    float g = sqrt(delta + c * c);
+    return 0.5 * delta / (g * (g + c));
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
 Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c_energy = coat.eta >= 1.0 ? c : w.z;
-    float T = lf_with_second_facet(lf_transmittance_dielectric(c_energy, coat.eta), interface_.gain);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(c, coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
     vec3 below = lf_refract_about_normal(air, interface_.n);
     return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
@@ -306,35 +319,44 @@ vec3 lf_transmittance(vec3 tau, float path) {
 
 // Turn a direction, azimuth kept, until its path 1 / w.z is longer by `lengthening`.
 vec3 lf_steer(vec3 w, float lengthening) {
-    float z = w.z / max(1.0 + lengthening * w.z, 1e-14);
-    float sine2 = w.x * w.x + w.y * w.y;
-    float growth = lengthening * z * w.z * (w.z + z) / max(sine2, 1e-14);
-    float ratio = sqrt(max(1.0 + growth, 0.0));
-    return vec3(w.x * ratio, w.y * ratio, z);
+    float z = w.z / (1.0 + lengthening * w.z);
+    float growth = lengthening * z * w.z * (w.z + z) / max(dot(w.xy, w.xy), 1e-14);
+    float ratio = sqrt(1.0 + growth);
+    return vec3(w.xy * ratio, z);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec3 lf_half_vector2(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return s * inversesqrt(dot(s, s));
+}
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine2(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    float s2 = dot(s, s);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
-    float m = 0.5 * (1.0 - sine) / max(n * cosine, 1e-14);
-    return n > 1.0 ? 0.5 - 0.5 * m / max(sqrt(max(alpha * alpha + m * m, 0.0)), 1e-14) : 0.0;
+    float m = 0.5 * (1.0 - sine) / (n * cosine);
+    return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
 }
 
 // Density of the facet normals of a tilted flake: Beckmann's, moved in the plane of slopes (Olano and Baker 2010, eq. 7).
@@ -342,13 +364,15 @@ float lf_tilted_d(vec3 h, vec2 tilt, float alpha) {
     float x = h.x - h.z * tilt.x;
     float y = h.y - h.z * tilt.y;
     bool above = h.z > 1e-04;
-    float inverse = 1.0 / (above ? h.z * h.z : 1.0);
-    return above ? exp(-((x * x + y * y) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha)) : 0.0;
+    float value = h.z * h.z;
+    float inverse = 1.0 / (above ? value : 1.0);
+    value = exp(-((x * x + y * y) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha));
+    return above ? value : 0.0;
 }
 
 // NoW (1 + 2 Lambda) of the Beckmann distribution (Heitz 2014, eq. 66, multiplied out).
 float lf_beckmann_projection(vec3 w, float alpha) {
-    float slope = max(sqrt(max(alpha * alpha * (w.x * w.x + w.y * w.y), 0.0)), 1e-10);
+    float slope = max(sqrt(alpha * alpha * dot(w.xy, w.xy)), 1e-10);
     float q = w.z / slope;
     return w.z * lf_erf(q) + slope * exp(-q * q) * 0.5641896;
 }
@@ -358,9 +382,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float kept = lf_kept_tilt(distance, lf_flakes.half_distance);
     vec2 tilt = lf_flake_tilt(uv, lf_flakes.per_uv, lf_flakes.sigma * kept, uint(lf_flakes.seed));
     float lost = lf_lost_variance(distance, lf_flakes.half_distance);
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    bool lit = min(wi.z, wo.z) > 0.0;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_candy.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_candy.alpha);
     float projection_i = lf_ggx_projection(wi, lf_candy.alpha);
@@ -370,55 +392,55 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     Crossing i = lf_cross(lf_candy_interface, lf_candy, wi, wi);
     Crossing o = lf_cross(lf_candy_interface, lf_candy, wo, wo);
     float throughput = i.T * o.T / (lf_candy.eta * lf_candy.eta);
-    float straight = 1.0 / max(i.w.z, 1e-14) + 1.0 / max(o.w.z, 1e-14);
+    float straight = (i.w.z + o.w.z) / (i.w.z * o.w.z);
     float added = i.lengthening + o.lengthening;
-    float sin_i = sqrt(max(wi.x * wi.x + wi.y * wi.y, 0.0));
-    float sin_o = sqrt(max(wo.x * wo.x + wo.y * wo.y, 0.0));
+    float sin_i = sqrt(dot(wi.xy, wi.xy));
+    float sin_o = sqrt(dot(wo.xy, wo.xy));
     float R_i = 1.0 - i.T;
     float R_o = 1.0 - o.T;
     vec3 directional = lf_transmittance(lf_candy.tau, straight + 0.5 * added);
     wi = lf_steer(i.w, 0.5 * i.drift);
     wo = lf_steer(o.w, 0.5 * o.drift);
-    vec3 h = lf_half_vector(wi, wo);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_flakes.eta, lf_flakes.k);
+    vec3 h = lf_half_vector2(wi, wo);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(wi, wo), lf_flakes.eta, lf_flakes.k);
     float R = 0.5 * (R_i + R_o);
     float t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
     float edge_i = lf_edge_reflection(sin_i, i.w.z, lf_candy_interface.n, t);
     float edge_o = lf_edge_reflection(sin_o, o.w.z, lf_candy_interface.n, t);
     vec3 q = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
-    float spread = (pow(max(i.spread, 1e-30), 1.5) + pow(max(o.spread, 1e-30), 1.5)) * pow(max(lf_candy.alpha, 1e-30), 1.5);
-    float total = spread + 2.2795072 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
-    total = total + 2.0 * pow(max(lf_candy.alpha, 1e-30), 1.5);
-    float width = min(pow(max(total, 1e-30), 0.6666667), 1.5);
+    float spread = (pow(i.spread, 1.5) + pow(o.spread, 1.5)) * pow(lf_candy.alpha, 1.5);
+    float total = spread + 2.2795072 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
+    total = total + 2.0 * pow(lf_candy.alpha, 1.5);
+    float width = pow(total, 0.6666667);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
     float own2 = t * t;
-    total = spread + 1.279507 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
-    total = total + 2.0 * pow(max(lf_candy.alpha, 1e-30), 1.5);
-    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(max(t, 1e-30), 1.5)));
+    total = spread + 1.279507 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
+    total = total + 2.0 * pow(lf_candy.alpha, 1.5);
+    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(t, 1.5)));
     float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
     float lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
-    total = spread + 1.6817929 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
-    total = total + pow(max(lf_candy.alpha, 1e-30), 1.5);
-    width = min(pow(max(total, 1e-30), 0.6666667), 1.5);
+    total = spread + 1.6817929 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
+    total = total + pow(lf_candy.alpha, 1.5);
+    width = pow(total, 0.6666667);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
     own2 = t * t;
-    total = spread + 0.68179286 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
-    total = total + pow(max(lf_candy.alpha, 1e-30), 1.5);
-    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(max(t, 1e-30), 1.5)));
+    total = spread + 0.68179286 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
+    total = total + pow(lf_candy.alpha, 1.5);
+    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(t, 1.5)));
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
     lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes = lobe + q * lobes;
-    total = spread + pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
-    width = min(pow(max(total, 1e-30), 0.6666667), 1.5);
+    total = spread + pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
+    width = pow(total, 0.6666667);
     t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
     own2 = t * t;
-    total = spread + 0.0 * pow(max(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1e-30), 1.5);
-    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(max(t, 1e-30), 1.5)));
+    total = spread + 0.0 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
+    added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(t, 1.5)));
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);

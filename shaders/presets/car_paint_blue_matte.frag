@@ -34,15 +34,16 @@ const CarPaint lf_paint = CarPaint(
 );
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Schlick 1994, eq. 15, from the reflectance at normal incidence.
@@ -53,25 +54,25 @@ float lf_fresnel_schlick(float c, float f0) {
 }
 
 // G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10).
-float lf_v_cavity(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    float NoH_over_c = 2.0 * s.z / max(dot(s, s), 1e-20);
-    return min(0.25 / max(wi.z * wo.z, 1e-14), 0.5 * NoH_over_c / max(max(wi.z, wo.z), 1e-14));
+float lf_v_cavity(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float NoH_over_c = 2.0 * s.w / max(dot(s, s), 1e-20);
+    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(max(wi.w, wo.w), 1e-14));
 }
 
 // Beckmann density of facet normals (Cook and Torrance 1982, eq. 14, normalised).
-float lf_beckmann_d(vec3 h, float alpha) {
-    bool above = h.z > 1e-04;
-    float inverse = 1.0 / (above ? h.z * h.z : 1.0);
-    return above ? exp(-((h.x * h.x + h.y * h.y) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha)) : 0.0;
+float lf_beckmann_d(vec4 h, float alpha) {
+    bool above = h.w > 1e-04;
+    float value = h.w * h.w;
+    float inverse = 1.0 / (above ? value : 1.0);
+    value = exp(-(dot(h.xyz, h.xyz) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha));
+    return above ? value : 0.0;
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
-    vec3 h = lf_half_vector(wi, wo);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
+    vec4 h = lf_half_vector(wi, wo);
     float c = lf_half_cosine(wi, wo);
     float V = lf_v_cavity(wi, wo);
     float D = lf_beckmann_d(h, lf_paint.alpha);
@@ -79,17 +80,15 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float D2 = lf_beckmann_d(h, lf_paint.alpha_2);
     float V3 = lf_v_cavity(wi, wo);
     float D3 = lf_beckmann_d(h, lf_paint.alpha_3);
-    return lit ? 4.0 * lf_paint.ks * lf_fresnel_schlick(c, lf_paint.f0) * (D * V) + 4.0 * lf_paint.ks_2 * lf_fresnel_schlick(c, lf_paint.f0_2) * (D2 * V2) + 4.0 * lf_paint.ks_3 * lf_fresnel_schlick(c, lf_paint.f0_3) * (D3 * V3) + lf_paint.kd / 3.1415927 : vec3(0.0);
+    vec3 value = 4.0 * lf_paint.ks * lf_fresnel_schlick(c, lf_paint.f0) * (D * V) + 4.0 * lf_paint.ks_2 * lf_fresnel_schlick(c, lf_paint.f0_2) * (D2 * V2) + 4.0 * lf_paint.ks_3 * lf_fresnel_schlick(c, lf_paint.f0_3) * (D3 * V3) + lf_paint.kd / 3.1415927;
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -44,7 +44,7 @@ struct Haze {
 };
 
 struct Crossing {
-    vec3 w;             // direction in the medium below
+    vec4 w;             // direction in the medium below
     float T;            // energy that passes
     float spread;       // width of the refracted directions over that of the facets
     float lengthening;  // path beyond that of the refracted direction, in thicknesses
@@ -84,8 +84,8 @@ const Haze lf_glaze_haze = Haze(
     vec3(0.72400004, 0.42400002, 0.54399997),         // between: the same, with light scattered forwards twice
     vec3(0.0012118297, 0.0019125638, 0.0015111135),   // upper_upper: light that goes on to and fro and stays within the upper third
     vec3(0.0007098455, 0.0013632263, 0.0009805667),   // upper_middle: that goes from the upper to the middle third, or back
-    vec3(0.00050186453, 0.0011000294, 0.000739269),   // upper_lower: from the upper to the lower third, or back
-    vec3(0.008195926, 0.016159065, 0.010613084),      // upper_base: from the upper third to the base, or back
+    vec3(0.00050186453, 0.0011000296, 0.000739269),   // upper_lower: from the upper to the lower third, or back
+    vec3(0.008195926, 0.016159065, 0.010613085),      // upper_base: from the upper third to the base, or back
     vec3(0.0010183486, 0.0016630971, 0.001283429),    // middle_middle: within the middle third
     vec3(0.0006751135, 0.0012710867, 0.00091004174),  // middle_lower: from the middle to the lower third, or back
     vec3(0.009874072, 0.01734185, 0.011897618),       // middle_base: from the middle third to the base, or back
@@ -106,42 +106,42 @@ vec3 lf_expm1(vec3 x) {
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -150,19 +150,18 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+float lf_facet_cosine(vec4 w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -171,55 +170,50 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+float lf_drift(vec4 w, float scale, float alpha) {
+    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
     return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec3 lf_refract_about_normal(vec3 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
-    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+vec4 lf_refract_about_normal(vec4 w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.w * w.w;
+    return vec4(w.xyz, sqrt(z2)) * (1.0 / eta);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
 float lf_slope_spread(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
-    float g = sqrt(max(delta + c * c, 0.0));
-    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
+    float g = sqrt(delta + c * c);
+    return 0.5 * delta / (g * (g + c));
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
+Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c_energy = coat.eta >= 1.0 ? c : w.z;
-    float T = lf_with_second_facet(lf_transmittance_dielectric(c_energy, coat.eta), interface_.gain);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(c, coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    vec3 below = lf_refract_about_normal(air, interface_.n);
+    vec4 below = lf_refract_about_normal(air, interface_.n);
     return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
 // Phase function [1/sr] of mean cosine g (Henyey and Greenstein 1941, eq. 2); `deflection` is 1 - cos of the turn, 0 to 2.
 float lf_henyey_greenstein(float deflection, float g) {
-    float a = g < 0.0 ? (-g) : g;
-    float spread = (1.0 - a) * (1.0 - a) + 2.0 * a * (g < 0.0 ? 2.0 - deflection : deflection);
-    return (1.0 - a) * (1.0 + a) / (12.566371 * (spread * sqrt(spread)));
+    float spread = (1.0 - g) * (1.0 - g) + 2.0 * g * deflection;
+    return (1.0 - g) * (1.0 + g) / (12.566371 * (spread * sqrt(spread)));
 }
 
 // The phase function [1/sr] as seen by way of rough boundaries, which widen it: by `spread`, to the power in which widths add.
 float lf_widened_phase(float deflection, float g, float spread) {
-    float a = max(abs(g), 1e-06);
-    float own = (1.0 - a) / (2.0 * sqrt(a));
-    float width = pow(max(pow(max(own, 1e-30), 1.34) + spread, 1e-30), 0.74626863);
+    float own = (1.0 - g) / (2.0 * sqrt(g));
+    float width = pow(pow(own, 1.34) + spread, 0.74626863);
     float ratio = (own + sqrt(1.0 + own * own)) / (width + sqrt(1.0 + width * width));
     return lf_henyey_greenstein(deflection, g * ratio * ratio);
 }
 
 // (1 - exp(-x)) / x for x >= 0: mean of exp(-x t) over t in [0, 1].
 vec3 lf_mean_transmittance(vec3 x) {
-    bvec3 thin = lessThan(x, vec3(0.01));
-    vec3 safe = mix(x, vec3(1.0), thin);
-    return mix(-lf_expm1(-safe) / safe, 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0))), thin);
+    return -lf_expm1(-x) / x;
 }
 
 // The same by the depth of scattering within `tau`, and paths in thicknesses: 1 / cos, or longer below a rough boundary.
@@ -247,29 +241,27 @@ vec3 lf_exchanged(Haze haze, Fluence i, Fluence o) {
     return f / 3.1415927;
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_glaze.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_glaze.alpha);
     float projection_i = lf_ggx_projection(wi, lf_glaze.alpha);
     float projection_o = lf_ggx_projection(wo, lf_glaze.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float f = F * D * V;
     Crossing i = lf_cross(lf_glaze_interface, lf_glaze, wi, wi);
     Crossing o = lf_cross(lf_glaze_interface, lf_glaze, wo, wo);
     float throughput = i.T * o.T / (lf_glaze.eta * lf_glaze.eta);
-    float both = pow(max(i.spread, 1e-30), 1.34) + pow(max(o.spread, 1e-30), 1.34);
-    float spread = both * pow(max(lf_glaze.alpha, 1e-30), 1.34);
-    float path = 1.0 / max(i.w.z, 1e-14);
+    float both = pow(i.spread, 1.34) + pow(o.spread, 1.34);
+    float spread = both * pow(lf_glaze.alpha, 1.34);
+    float path = 1.0 / i.w.w;
     path = path + i.lengthening;
-    float path2 = 1.0 / max(o.w.z, 1e-14);
+    float path2 = 1.0 / o.w.w;
     path2 = path2 + o.lengthening;
     float back = 1.0 + dot(i.w, o.w);
     float phase = lf_widened_phase(back, lf_glaze.g, spread);
-    float even = 0.07957747 * (1.0 - max(lf_glaze.g, 0.0));
+    float even = 0.07957747 * (1.0 - lf_glaze.g);
     vec3 f2 = lf_once_back(even, lf_glaze.tau_s, lf_glaze_haze.reduced, path, path2);
     f2 = f2 + lf_once_back(phase - even, lf_glaze.tau_s, lf_glaze_haze.between, path, path2);
     Fluence beam_i = lf_fluence(lf_glaze_haze.reduced, path);
@@ -279,14 +271,11 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     return lit ? f2 : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -37,7 +37,7 @@ struct Lambert {
 };
 
 struct Crossing {
-    vec3 w;             // direction in the medium below
+    vec4 w;             // direction in the medium below
     vec3 T;             // energy that passes
     float spread;       // width of the refracted directions over that of the facets
     float lengthening;  // path beyond that of the refracted direction, in thicknesses
@@ -45,16 +45,16 @@ struct Crossing {
 };
 
 const Coat lf_glass = Coat(
-    vec3(-0.06518905, -0.078962244, -0.09237827),           // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
-    vec3(0.13004997, 0.14349419, 0.16166194),               // film_1: degree 1
-    vec3(-0.05340466, -0.053812724, -0.053872414),          // film_2: degree 2
-    vec3(-0.008618205, -0.009638291, -0.010735826),         // film_3: degree 3
-    vec3(0.012164605, 0.012516424, 0.013052933),            // film_4: degree 4
-    vec3(-0.00028934935, -0.00016842503, 1.1229422e-06),    // film_5: degree 5
-    vec3(-0.00085929246, -0.00086549064, -0.00088436785),   // film_6: degree 6
-    vec3(-0.000102444785, -0.00010237086, -0.00011172227),  // film_7: degree 7
-    vec3(-6.0232822e-05, -5.8979727e-05, -6.024842e-05),    // film_8: degree 8
-    vec3(2.8912676e-05, 2.7506147e-05, 2.5422894e-05),      // film_9: degree 9
+    vec3(-0.06518905, -0.07896224, -0.09237827),            // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
+    vec3(0.13004999, 0.14349419, 0.16166191),               // film_1: degree 1
+    vec3(-0.053404685, -0.053812753, -0.053872436),         // film_2: degree 2
+    vec3(-0.008618194, -0.009638261, -0.010735792),         // film_3: degree 3
+    vec3(0.012164612, 0.01251642, 0.013052918),             // film_4: degree 4
+    vec3(-0.0002893512, -0.00016844738, 1.108041e-06),      // film_5: degree 5
+    vec3(-0.0008593055, -0.00086547574, -0.0008843492),     // film_6: degree 6
+    vec3(-0.00010244106, -0.00010235782, -0.000111718546),  // film_7: degree 7
+    vec3(-6.021699e-05, -5.900953e-05, -6.0270773e-05),     // film_8: degree 8
+    vec3(2.8896378e-05, 2.7528498e-05, 2.5437796e-05),      // film_9: degree 9
     0.02,                                                   // alpha: width of the facet slopes; the square of an artist's roughness
     1.52                                                    // eta: index of refraction, against air
 );
@@ -62,7 +62,7 @@ const Coat lf_glass = Coat(
 const Interface lf_glass_interface = Interface(
     1.52,           // n: index of the medium below, against air
     0.02,           // alpha: width of the facets, mean of the axes
-    0.0031546697,   // tilt: turn of the mean facet towards a grazing direction
+    0.0031546694,   // tilt: turn of the mean facet towards a grazing direction
     0.0015962153,   // gain: part of the reflected light that a second facet lets in
     0.00010532755,  // lengthening: path added by the spread of refracted directions, in thicknesses
     0.036961365     // drift: scale of the path added at grazing angles
@@ -75,19 +75,20 @@ const Lambert lf_black = Lambert(
 const vec3 lf_black_returned = vec3(1.0023817, 1.0023729, 1.0023694);
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.
 float lf_rarer_cosine(float c, float eta) {
-    return eta >= 1.0 ? c : sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0)) / eta;
+    return c;
 }
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
 float lf_chebyshev_argument(float c) {
-    return max((2.0 * sqrt(max(c, 0.0)) - 1.06) / 0.94, -1.0);
+    return max((2.0 * sqrt(c) - 1.06) / 0.94, -1.0);
 }
 
 // What Schlick's formula takes for f0 of a coat with a film, in daylight; `c` on the rarer side.
@@ -112,21 +113,21 @@ vec3 lf_fresnel_schlick(float c, vec3 f0) {
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -135,8 +136,27 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+float lf_facet_cosine(vec4 w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+}
+
+// sqrt(c) as -1 to 1, from where a film's polynomial begins.
+float lf_chebyshev_argument2(float c) {
+    return (2.0 * sqrt(c) - 1.06) / 0.94;
+}
+
+// What Schlick's formula takes for f0 of a coat with a film, in daylight; `c` on the rarer side.
+vec3 lf_film_on_coat2(Coat coat, float c) {
+    float s = lf_chebyshev_argument2(c);
+    vec3 total = coat.film_8 + 2.0 * s * coat.film_9;
+    vec3 total2 = coat.film_7 + 2.0 * s * total - coat.film_9;
+    total = coat.film_6 + 2.0 * s * total2 - total;
+    total2 = coat.film_5 + 2.0 * s * total - total2;
+    total = coat.film_4 + 2.0 * s * total2 - total;
+    total2 = coat.film_3 + 2.0 * s * total - total2;
+    total = coat.film_2 + 2.0 * s * total2 - total;
+    total2 = coat.film_1 + 2.0 * s * total - total2;
+    return coat.film_0 + s * total2 - total;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -145,42 +165,39 @@ vec3 lf_with_second_facet(vec3 T, float gain) {
 }
 
 // Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+float lf_drift(vec4 w, float scale, float alpha) {
+    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
     return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec3 lf_refract_about_normal(vec3 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
-    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+vec4 lf_refract_about_normal(vec4 w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.w * w.w;
+    return vec4(w.xyz, sqrt(z2)) * (1.0 / eta);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
 float lf_slope_spread(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
-    float g = sqrt(max(delta + c * c, 0.0));
-    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
+    float g = sqrt(delta + c * c);
+    return 0.5 * delta / (g * (g + c));
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
+Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c_energy = coat.eta >= 1.0 ? c : w.z;
-    float c2 = lf_rarer_cosine(c_energy, coat.eta);
-    vec3 t = lf_film_on_coat(coat, c2);
+    float c2 = lf_rarer_cosine(c, coat.eta);
+    vec3 t = lf_film_on_coat2(coat, c2);
     vec3 below = 1.0 - min(max(lf_fresnel_schlick(c2, t) * 200.0, 0.0), 1.0);
     vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c2 * (5.0 - c2 * (10.0 - c2 * (10.0 - c2 * (5.0 - c2))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    below = lf_refract_about_normal(air, interface_.n);
-    return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
+    vec4 below2 = lf_refract_about_normal(air, interface_.n);
+    return Crossing(below2, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float c = lf_rarer_cosine(lf_half_cosine(wi, wo), lf_glass.eta);
     vec3 reflected = lf_fresnel_schlick(c, lf_film_on_coat(lf_glass, c));
     vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
@@ -188,7 +205,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_glass.alpha);
     float projection_i = lf_ggx_projection(wi, lf_glass.alpha);
     float projection_o = lf_ggx_projection(wo, lf_glass.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     vec3 f = F * D * V;
     Crossing i = lf_cross(lf_glass_interface, lf_glass, wi, wi);
     Crossing o = lf_cross(lf_glass_interface, lf_glass, wo, wo);
@@ -198,14 +215,11 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     return lit ? f : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -38,7 +38,7 @@ struct OrenNayar {
 };
 
 struct Crossing {
-    vec3 w;             // direction in the medium below
+    vec4 w;             // direction in the medium below
     vec3 T;             // energy that passes
     float spread;       // width of the refracted directions over that of the facets
     float lengthening;  // path beyond that of the refracted direction, in thicknesses
@@ -90,19 +90,20 @@ float lf_atan2(float y, float x) {
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.
 float lf_rarer_cosine(float c, float eta) {
-    return eta >= 1.0 ? c : sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0)) / eta;
+    return c;
 }
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
 float lf_chebyshev_argument(float c) {
-    return max((2.0 * sqrt(max(c, 0.0)) - 1.06) / 0.94, -1.0);
+    return max((2.0 * sqrt(c) - 1.06) / 0.94, -1.0);
 }
 
 // What Schlick's formula takes for f0 of a coat with a film, in daylight; `c` on the rarer side.
@@ -127,21 +128,21 @@ vec3 lf_fresnel_schlick(float c, vec3 f0) {
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -150,8 +151,27 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+float lf_facet_cosine(vec4 w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+}
+
+// sqrt(c) as -1 to 1, from where a film's polynomial begins.
+float lf_chebyshev_argument2(float c) {
+    return (2.0 * sqrt(c) - 1.06) / 0.94;
+}
+
+// What Schlick's formula takes for f0 of a coat with a film, in daylight; `c` on the rarer side.
+vec3 lf_film_on_coat2(Coat coat, float c) {
+    float s = lf_chebyshev_argument2(c);
+    vec3 total = coat.film_8 + 2.0 * s * coat.film_9;
+    vec3 total2 = coat.film_7 + 2.0 * s * total - coat.film_9;
+    total = coat.film_6 + 2.0 * s * total2 - total;
+    total2 = coat.film_5 + 2.0 * s * total - total2;
+    total = coat.film_4 + 2.0 * s * total2 - total;
+    total2 = coat.film_3 + 2.0 * s * total - total2;
+    total = coat.film_2 + 2.0 * s * total2 - total;
+    total2 = coat.film_1 + 2.0 * s * total - total2;
+    return coat.film_0 + s * total2 - total;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -160,60 +180,62 @@ vec3 lf_with_second_facet(vec3 T, float gain) {
 }
 
 // Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+float lf_drift(vec4 w, float scale, float alpha) {
+    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
     return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec3 lf_refract_about_normal(vec3 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
-    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+vec4 lf_refract_about_normal(vec4 w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.w * w.w;
+    return vec4(w.xyz, sqrt(z2)) * (1.0 / eta);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
 float lf_slope_spread(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
-    float g = sqrt(max(delta + c * c, 0.0));
-    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
+    float g = sqrt(delta + c * c);
+    return 0.5 * delta / (g * (g + c));
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
+Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c_energy = coat.eta >= 1.0 ? c : w.z;
-    float c2 = lf_rarer_cosine(c_energy, coat.eta);
-    vec3 t = lf_film_on_coat(coat, c2);
+    float c2 = lf_rarer_cosine(c, coat.eta);
+    vec3 t = lf_film_on_coat2(coat, c2);
     vec3 below = 1.0 - min(max(lf_fresnel_schlick(c2, t) * 200.0, 0.0), 1.0);
     vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c2 * (5.0 - c2 * (10.0 - c2 * (10.0 - c2 * (5.0 - c2))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    below = lf_refract_about_normal(air, interface_.n);
-    return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
+    vec4 below2 = lf_refract_about_normal(air, interface_.n);
+    return Crossing(below2, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
 // Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection.
-float lf_oren_nayar_full(vec3 wi, vec3 wo, float albedo, float sigma) {
+float lf_oren_nayar_full(vec4 wi, vec4 wo, float albedo, float sigma) {
     float sigma2 = sigma * sigma;
     float c1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33);
     float c2 = 0.45 * sigma2 / (sigma2 + 0.09);
     float c3 = 0.125 * sigma2 / (sigma2 + 0.09);
     float c4 = 0.17 * sigma2 / (sigma2 + 0.13);
-    float sin_i = sqrt(max(wi.x * wi.x + wi.y * wi.y, 0.0));
-    float sin_o = sqrt(max(wo.x * wo.x + wo.y * wo.y, 0.0));
-    float elevation_i = lf_atan2(wi.z, sin_i) * 0.63661975;
-    float elevation_o = lf_atan2(wo.z, sin_o) * 0.63661975;
+    float sin_i = sqrt(dot(wi.xyz, wi.xyz));
+    float sin_o = sqrt(dot(wo.xyz, wo.xyz));
+    float elevation_i = lf_atan2(wi.w, sin_i) * 0.63661975;
+    float elevation_o = lf_atan2(wo.w, sin_o) * 0.63661975;
     float higher = max(elevation_i, elevation_o);
-    float lower_cos = min(wi.z, wo.z);
-    float larger_cos = max(wi.z, wo.z);
+    float lower_cos = min(wi.w, wo.w);
+    float larger_cos = max(wi.w, wo.w);
     float larger_sin = max(sin_i, sin_o);
-    float dot_xy = wi.x * wo.x + wi.y * wo.y;
+    float dot_xy = dot(wi.xyz, wo.xyz);
     float cos_phi = dot_xy / max(sin_i * sin_o, 1e-14);
-    float sin_phi = (wi.x * wo.y - wi.y * wo.x) / max(sin_i * sin_o, 1e-14);
-    float aside = sin_phi * sin_phi / (1.0 + abs(cos_phi));
+    vec3 azimuth_i = wi.xyz / max(sin_i, 1e-14);
+    vec3 azimuth_o = wo.xyz / max(sin_o, 1e-14);
+    bool facing = dot_xy < 0.0;
+    vec3 apart = azimuth_i + (facing ? azimuth_o : (-azimuth_o));
+    float aside = 0.5 * dot(apart, apart);
     float forward = dot_xy / larger_cos;
     float gap = higher * (3.0 - higher * (3.0 - higher)) - lower_cos * lower_cos / (1.0 + larger_sin);
     float backward = dot_xy * gap / max(larger_cos * larger_sin, 1e-14);
-    float tan_mean = (sin_i + sin_o) / (wi.z + wo.z);
+    float tan_mean = (sin_i + sin_o) / (wi.w + wo.w);
     float smaller = 1.0 - higher;
     float product = smaller * (1.0 - min(elevation_i, elevation_o));
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
@@ -222,11 +244,9 @@ float lf_oren_nayar_full(vec3 wi, vec3 wo, float albedo, float sigma) {
     return albedo / 3.1415927 * max(direct + albedo * interreflected, 0.0);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float c = lf_rarer_cosine(lf_half_cosine(wi, wo), lf_water.eta);
     vec3 reflected = lf_fresnel_schlick(c, lf_film_on_coat(lf_water, c));
     vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
@@ -234,7 +254,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_water.alpha);
     float projection_i = lf_ggx_projection(wi, lf_water.alpha);
     float projection_o = lf_ggx_projection(wo, lf_water.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     vec3 f = F * D * V;
     Crossing i = lf_cross(lf_water_interface, lf_water, wi, wi);
     Crossing o = lf_cross(lf_water_interface, lf_water, wo, wo);
@@ -244,14 +264,11 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     return lit ? f : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -58,7 +58,7 @@ struct Fluence {
 };
 
 struct Crossing {
-    vec3 w;             // direction in the medium below
+    vec4 w;             // direction in the medium below
     float T;            // energy that passes
     float spread;       // width of the refracted directions over that of the facets
     float lengthening;  // path beyond that of the refracted direction, in thicknesses
@@ -224,7 +224,7 @@ float lf_onset(float g, float t0, float p) {
 
 // Thickness of a layer that slows its own growth (parabolic law, Tammann 1920; Wagner 1933): rate sqrt(t - t_on) after the onset.
 float lf_tarnish_thickness(float t, float t_on, float rate, float blur) {
-    t = (t - t_on) / max(blur, 1e-14);
+    t = (t - t_on) / blur;
     return rate * sqrt(max(blur * (max(t, 0.0) + lf_log1p(exp(-abs(t)))), 0.0));
 }
 
@@ -236,17 +236,16 @@ float lf_thickness_at(float g, Growth growth, float blur) {
 
 // Cosine between a direction and the facets that it meets.
 float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+    return sqrt(max(tilt + (1.0 - tilt) * (w.z * w.z), 0.0));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
     float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
+    float perpendicular = 1.0 / max(c + g, 1e-14);
+    float parallel = 1.0 / max(eta2 * c + g, 1e-14);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return eta == 1.0 ? 1.0 : passed;
 }
 
@@ -274,58 +273,55 @@ Fluence lf_fluence(vec3 tau, float path) {
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
     vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
     vec3 larger = sqrt(0.5 * (q + abs(p)));
     vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -333,32 +329,46 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
+// Cosine between a direction and the facets that it meets.
+float lf_facet_cosine(vec4 w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+}
+
+// 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
+float lf_transmittance_dielectric2(float c, float eta) {
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
+    float eta2 = eta * eta;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
+}
+
 // Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+float lf_drift(vec4 w, float scale, float alpha) {
+    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
     return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec3 lf_refract_about_normal(vec3 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
-    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+vec4 lf_refract_about_normal(vec4 w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.w * w.w;
+    return vec4(w.xyz, sqrt(z2)) * (1.0 / eta);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
 float lf_slope_spread(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
-    float g = sqrt(max(delta + c * c, 0.0));
-    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
+    float g = sqrt(delta + c * c);
+    return 0.5 * delta / (g * (g + c));
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
+Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c_energy = coat.eta >= 1.0 ? c : w.z;
-    float T = lf_with_second_facet(lf_transmittance_dielectric(c_energy, coat.eta), interface_.gain);
+    float T = lf_with_second_facet(lf_transmittance_dielectric2(c, coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    vec3 below = lf_refract_about_normal(air, interface_.n);
+    vec4 below = lf_refract_about_normal(air, interface_.n);
     return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
@@ -368,23 +378,70 @@ vec3 lf_transmittance(vec3 tau, float path) {
 }
 
 // Turn a direction, azimuth kept, until its path 1 / w.z is longer by `lengthening`.
-vec3 lf_steer(vec3 w, float lengthening) {
-    float z = w.z / max(1.0 + lengthening * w.z, 1e-14);
-    float sine2 = w.x * w.x + w.y * w.y;
-    float growth = lengthening * z * w.z * (w.z + z) / max(sine2, 1e-14);
-    float ratio = sqrt(max(1.0 + growth, 0.0));
-    return vec3(w.x * ratio, w.y * ratio, z);
+vec4 lf_steer(vec4 w, float lengthening) {
+    float z = w.w / (1.0 + lengthening * w.w);
+    float growth = lengthening * z * w.w * (w.w + z) / max(dot(w.xyz, w.xyz), 1e-14);
+    float ratio = sqrt(1.0 + growth);
+    return vec4(w.xyz * ratio, z);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec4 lf_half_vector2(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(dot(s, s));
+}
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine2(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = dot(s, s);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+}
+
+// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
+vec3 lf_fresnel_conductor2(float c, vec3 eta, vec3 k) {
+    float c2 = c * c;
+    float s2 = 1.0 - c2;
+    vec3 p = (eta - k) * (eta + k) - s2;
+    vec3 nk = eta * k;
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
+    vec3 twice_ac = 2.0 * a * c;
+    vec3 even = q * c2 + s2 * s2;
+    vec3 odd = twice_ac * s2;
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
-    float m = 0.5 * (1.0 - sine) / max(n * cosine, 1e-14);
-    return n > 1.0 ? 0.5 - 0.5 * m / max(sqrt(max(alpha * alpha + m * m, 0.0)), 1e-14) : 0.0;
+    float m = 0.5 * (1.0 - sine) / (n * cosine);
+    return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // The same by the depth of scattering within `tau`, and paths in thicknesses: 1 / cos, or longer below a rough boundary.
 vec3 lf_once_back(float phase, vec3 tau_s, vec3 tau, float path_i, float path_o) {
     return tau_s * (phase * path_i * path_o) * lf_mean_transmittance(tau * (path_i + path_o));
+}
+
+// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
+vec3 lf_fresnel_conductor3(float c, vec3 eta, vec3 k) {
+    float c2 = c * c;
+    float s2 = 1.0 - c2;
+    vec3 p = (eta - k) * (eta + k) - s2;
+    vec3 nk = eta * k;
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
+    vec3 twice_ac = 2.0 * a * c;
+    vec3 even = q * c2 + s2 * s2;
+    vec3 odd = twice_ac * s2;
+    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
 }
 
 // The same for light that goes on to the other side.
@@ -432,20 +489,17 @@ TwoFlux lf_kubelka_munk(vec3 Kx, float Sx) {
     return TwoFlux(Sx * sinh_z / whole, fall / whole);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     float g = lf_field_at(uv, lf_patina_growth);
     Cover cover = lf_cover_at(g, lf_patina_growth);
     float thickness = lf_thickness_at(g, lf_patina_growth, lf_patina_crust.blur);
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    bool lit = min(wi.w, wo.w) > 0.0;
     vec3 t = lf_patina_coat.tau * thickness;
     vec3 t2 = lf_patina_coat.tau_s * thickness;
     vec3 t3 = t + t2;
     vec3 t4 = t2 / 12.0;
-    float t5 = lf_patina_interface.n < 1.0 ? lf_patina_interface.n : 1.0;
-    float t6 = t5 / lf_patina_interface.n;
+    float t5 = 1.0 / lf_patina_interface.n;
     vec3 total = vec3(0.0);
     vec3 total2 = vec3(0.0);
     vec3 total3 = vec3(0.0);
@@ -456,15 +510,16 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
         float u2 = lf_row1[k] * lf_row1[k];
         float u3 = u2 * lf_row1[k];
         float jacobian = 6.0 * u2 * u3;
-        float p2 = (1.0 - u3) * (1.0 + u3) * t5 * t5;
+        float p2 = (1.0 - u3) * (1.0 + u3);
         float cosine2 = 1.0 - p2;
         vec3 w = vec3(sqrt(max(p2, 0.0)), 0.0, sqrt(max(cosine2, 0.0)));
-        float c = lf_patina_coat.eta >= 1.0 ? lf_facet_cosine(w, lf_patina_interface.tilt) : w.z;
-        float T = cosine2 > 0.0 ? lf_with_second_facet(lf_transmittance_dielectric(c, lf_patina_coat.eta), lf_patina_interface.gain) : 0.0;
-        float t7 = t5 * u3;
-        float cosine = sqrt(max(t7 * t7 + (lf_patina_interface.n - t5) * (lf_patina_interface.n + t5), 0.0)) / lf_patina_interface.n;
-        float outside = u3 * sqrt(max(1.0 - t6 * t6, 0.0));
-        t7 = 1.0 - T;
+        float value = lf_facet_cosine(w, lf_patina_interface.tilt);
+        float c = lf_patina_coat.eta >= 1.0 ? value : w.z;
+        value = lf_with_second_facet(lf_transmittance_dielectric(c, lf_patina_coat.eta), lf_patina_interface.gain);
+        float T = cosine2 > 0.0 ? value : 0.0;
+        float cosine = sqrt(max(u3 * u3 + (lf_patina_interface.n - 1.0) * (lf_patina_interface.n + 1.0), 0.0)) / lf_patina_interface.n;
+        float outside = u3 * sqrt(max(1.0 - t5 * t5, 0.0));
+        float t6 = 1.0 - T;
         float path = 1.0 / max(cosine, 1e-06);
         Fluence beam = lf_fluence(t3, path);
         vec3 third = t3 * path / 3.0;
@@ -472,18 +527,18 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
         vec3 safe = mix(third, vec3(1.0), thin);
         vec3 series = 0.5 - third / 6.0 * (1.0 - third / 4.0 * (1.0 - third / 5.0 * (1.0 - third / 6.0 * (1.0 - third / 7.0))));
         vec3 own = 2.0 * path * path * mix((1.0 - lf_mean_transmittance(safe)) / safe, series, thin);
-        vec3 t8 = path * lf_mean_transmittance(third);
-        vec3 next_one = t8 * t8;
+        vec3 t7 = path * lf_mean_transmittance(third);
+        vec3 next_one = t7 * t7;
         vec3 after_next = next_one * exp(-third);
-        t8 = lf_fresnel_conductor(cosine, lf_base.eta, lf_base.k);
-        series = 1.0 / max(1.0 - t7 * t8 * beam.base * beam.base, 1e-06);
-        vec3 across = t7 * t8 * beam.base;
-        vec3 one_sided = t7 * beam.upper * beam.upper + t8 * beam.lower * beam.lower;
-        vec3 one_sided2 = t7 * beam.upper * beam.middle + t8 * beam.lower * beam.middle;
-        vec3 one_sided3 = t7 * beam.upper * beam.lower + t8 * beam.lower * beam.upper;
-        vec3 one_sided4 = t7 * beam.middle * beam.middle + t8 * beam.middle * beam.middle;
-        vec3 one_sided5 = t7 * beam.middle * beam.lower + t8 * beam.middle * beam.upper;
-        vec3 one_sided6 = t7 * beam.lower * beam.lower + t8 * beam.upper * beam.upper;
+        t7 = lf_fresnel_conductor(cosine, lf_base.eta, lf_base.k);
+        series = 1.0 / max(1.0 - t6 * t7 * beam.base * beam.base, 1e-06);
+        vec3 across = t6 * t7 * beam.base;
+        vec3 one_sided = t6 * beam.upper * beam.upper + t7 * beam.lower * beam.lower;
+        vec3 one_sided2 = t6 * beam.upper * beam.middle + t7 * beam.lower * beam.middle;
+        vec3 one_sided3 = t6 * beam.upper * beam.lower + t7 * beam.lower * beam.upper;
+        vec3 one_sided4 = t6 * beam.middle * beam.middle + t7 * beam.middle * beam.middle;
+        vec3 one_sided5 = t6 * beam.middle * beam.lower + t7 * beam.middle * beam.upper;
+        vec3 one_sided6 = t6 * beam.lower * beam.lower + t7 * beam.upper * beam.upper;
         path = 1.0 / max(outside, 1e-06);
         Fluence beam2 = lf_fluence(t3, path);
         third = t3 * path / 3.0;
@@ -491,143 +546,138 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
         safe = mix(third, vec3(1.0), thin);
         vec3 series2 = 0.5 - third / 6.0 * (1.0 - third / 4.0 * (1.0 - third / 5.0 * (1.0 - third / 6.0 * (1.0 - third / 7.0))));
         vec3 own2 = 2.0 * path * path * mix((1.0 - lf_mean_transmittance(safe)) / safe, series2, thin);
-        t8 = path * lf_mean_transmittance(third);
-        vec3 next_one2 = t8 * t8;
+        t7 = path * lf_mean_transmittance(third);
+        vec3 next_one2 = t7 * t7;
         vec3 after_next2 = next_one2 * exp(-third);
-        t8 = lf_fresnel_conductor(outside, lf_base.eta, lf_base.k);
-        series2 = 1.0 / max(1.0 - t8 * beam2.base * beam2.base, 1e-06);
-        vec3 across2 = t8 * beam2.base;
-        vec3 one_sided7 = beam2.upper * beam2.upper + t8 * beam2.lower * beam2.lower;
-        vec3 one_sided8 = beam2.upper * beam2.middle + t8 * beam2.lower * beam2.middle;
-        vec3 one_sided9 = beam2.upper * beam2.lower + t8 * beam2.lower * beam2.upper;
-        vec3 one_sided10 = beam2.middle * beam2.middle + t8 * beam2.middle * beam2.middle;
-        vec3 one_sided11 = beam2.middle * beam2.lower + t8 * beam2.middle * beam2.upper;
-        vec3 one_sided12 = beam2.lower * beam2.lower + t8 * beam2.upper * beam2.upper;
-        total = total + lf_row2[k] * (jacobian * (t6 * t6 * (own + series * (one_sided + across * (beam.upper * beam.lower + beam.lower * beam.upper))) + (1.0 - t6 * t6) * (own2 + series2 * (one_sided7 + across2 * (beam2.upper * beam2.lower + beam2.lower * beam2.upper)))));
-        total2 = total2 + lf_row2[k] * (jacobian * (t6 * t6 * (next_one + series * (one_sided2 + across * (beam.upper * beam.middle + beam.lower * beam.middle))) + (1.0 - t6 * t6) * (next_one2 + series2 * (one_sided8 + across2 * (beam2.upper * beam2.middle + beam2.lower * beam2.middle)))));
-        total3 = total3 + lf_row2[k] * (jacobian * (t6 * t6 * (after_next + series * (one_sided3 + across * (beam.upper * beam.upper + beam.lower * beam.lower))) + (1.0 - t6 * t6) * (after_next2 + series2 * (one_sided9 + across2 * (beam2.upper * beam2.upper + beam2.lower * beam2.lower)))));
-        total4 = total4 + lf_row2[k] * (jacobian * (t6 * t6 * (own + series * (one_sided4 + across * (beam.middle * beam.middle + beam.middle * beam.middle))) + (1.0 - t6 * t6) * (own2 + series2 * (one_sided10 + across2 * (beam2.middle * beam2.middle + beam2.middle * beam2.middle)))));
-        total5 = total5 + lf_row2[k] * (jacobian * (t6 * t6 * (next_one + series * (one_sided5 + across * (beam.middle * beam.upper + beam.middle * beam.lower))) + (1.0 - t6 * t6) * (next_one2 + series2 * (one_sided11 + across2 * (beam2.middle * beam2.upper + beam2.middle * beam2.lower)))));
-        total6 = total6 + lf_row2[k] * (jacobian * (t6 * t6 * (own + series * (one_sided6 + across * (beam.lower * beam.upper + beam.upper * beam.lower))) + (1.0 - t6 * t6) * (own2 + series2 * (one_sided12 + across2 * (beam2.lower * beam2.upper + beam2.upper * beam2.lower)))));
+        t7 = lf_fresnel_conductor(outside, lf_base.eta, lf_base.k);
+        series2 = 1.0 / max(1.0 - t7 * beam2.base * beam2.base, 1e-06);
+        vec3 across2 = t7 * beam2.base;
+        vec3 one_sided7 = beam2.upper * beam2.upper + t7 * beam2.lower * beam2.lower;
+        vec3 one_sided8 = beam2.upper * beam2.middle + t7 * beam2.lower * beam2.middle;
+        vec3 one_sided9 = beam2.upper * beam2.lower + t7 * beam2.lower * beam2.upper;
+        vec3 one_sided10 = beam2.middle * beam2.middle + t7 * beam2.middle * beam2.middle;
+        vec3 one_sided11 = beam2.middle * beam2.lower + t7 * beam2.middle * beam2.upper;
+        vec3 one_sided12 = beam2.lower * beam2.lower + t7 * beam2.upper * beam2.upper;
+        total = total + lf_row2[k] * (jacobian * (t5 * t5 * (own + series * (one_sided + across * (beam.upper * beam.lower + beam.lower * beam.upper))) + (1.0 - t5 * t5) * (own2 + series2 * (one_sided7 + across2 * (beam2.upper * beam2.lower + beam2.lower * beam2.upper)))));
+        total2 = total2 + lf_row2[k] * (jacobian * (t5 * t5 * (next_one + series * (one_sided2 + across * (beam.upper * beam.middle + beam.lower * beam.middle))) + (1.0 - t5 * t5) * (next_one2 + series2 * (one_sided8 + across2 * (beam2.upper * beam2.middle + beam2.lower * beam2.middle)))));
+        total3 = total3 + lf_row2[k] * (jacobian * (t5 * t5 * (after_next + series * (one_sided3 + across * (beam.upper * beam.upper + beam.lower * beam.lower))) + (1.0 - t5 * t5) * (after_next2 + series2 * (one_sided9 + across2 * (beam2.upper * beam2.upper + beam2.lower * beam2.lower)))));
+        total4 = total4 + lf_row2[k] * (jacobian * (t5 * t5 * (own + series * (one_sided4 + across * (beam.middle * beam.middle + beam.middle * beam.middle))) + (1.0 - t5 * t5) * (own2 + series2 * (one_sided10 + across2 * (beam2.middle * beam2.middle + beam2.middle * beam2.middle)))));
+        total5 = total5 + lf_row2[k] * (jacobian * (t5 * t5 * (next_one + series * (one_sided5 + across * (beam.middle * beam.upper + beam.middle * beam.lower))) + (1.0 - t5 * t5) * (next_one2 + series2 * (one_sided11 + across2 * (beam2.middle * beam2.upper + beam2.middle * beam2.lower)))));
+        total6 = total6 + lf_row2[k] * (jacobian * (t5 * t5 * (own + series * (one_sided6 + across * (beam.lower * beam.upper + beam.upper * beam.lower))) + (1.0 - t5 * t5) * (own2 + series2 * (one_sided12 + across2 * (beam2.lower * beam2.upper + beam2.upper * beam2.lower)))));
     }
-    vec3 t7 = t4 * total;
-    vec3 t8 = t4 * total2;
-    vec3 t9 = t4 * total3;
-    vec3 t10 = t4 * total2;
-    vec3 t11 = t4 * total4;
-    vec3 t12 = t4 * total5;
-    vec3 t13 = t4 * total3;
-    vec3 t14 = t4 * total5;
-    vec3 t15 = t4 * total6;
-    vec3 t16 = 0.0 - t10;
-    vec3 t17 = 0.0 - t13;
-    vec3 t18 = 1.0 / max(1.0 - t7, 1e-06);
-    vec3 t19 = (0.0 - t8) * t18;
-    vec3 t20 = (0.0 - t9) * t18;
-    t7 = t7 * t18;
-    t8 = t8 * t18;
-    t9 = t9 * t18;
-    t18 = 0.0 - t14 - t17 * t19;
-    vec3 t21 = 1.0 / max(1.0 - t11 - t16 * t19, 1e-06);
-    vec3 t22 = (0.0 - t12 - t16 * t20) * t21;
-    t10 = (t10 - t16 * t7) * t21;
-    t11 = (t11 - t16 * t8) * t21;
-    t12 = (t12 - t16 * t9) * t21;
-    t16 = t20 - t19 * t22;
-    t20 = 1.0 / max(1.0 - t15 - t17 * t20 - t18 * t22, 1e-06);
-    t14 = (t14 - t17 * t8 - t18 * t11) * t20;
-    t15 = (t15 - t17 * t9 - t18 * t12) * t20;
-    bool lit2 = wi.z > 0.0 && wo.z > 0.0;
-    vec3 wi2 = lit2 ? wi : vec3(0.0, 0.0, 1.0);
-    vec3 wo2 = lit2 ? wo : vec3(0.0, 0.0, 1.0);
-    float F = lf_fresnel_dielectric(lf_half_cosine(wi2, wo2), lf_patina_coat.eta);
-    float D = lf_ggx_d(lf_half_vector(wi2, wo2), lf_patina_coat.alpha);
-    float projection_i = lf_ggx_projection(wi2, lf_patina_coat.alpha);
-    float projection_o = lf_ggx_projection(wo2, lf_patina_coat.alpha);
-    float V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
+    vec3 t6 = t4 * total;
+    vec3 t7 = t4 * total2;
+    vec3 t8 = t4 * total3;
+    vec3 t9 = t4 * total2;
+    vec3 t10 = t4 * total4;
+    vec3 t11 = t4 * total5;
+    vec3 t12 = t4 * total3;
+    vec3 t13 = t4 * total5;
+    vec3 t14 = t4 * total6;
+    vec3 t15 = 0.0 - t9;
+    vec3 t16 = 0.0 - t12;
+    vec3 t17 = 1.0 / max(1.0 - t6, 1e-06);
+    vec3 t18 = (0.0 - t7) * t17;
+    vec3 t19 = (0.0 - t8) * t17;
+    t6 = t6 * t17;
+    t7 = t7 * t17;
+    t8 = t8 * t17;
+    t17 = 0.0 - t13 - t16 * t18;
+    vec3 t20 = 1.0 / max(1.0 - t10 - t15 * t18, 1e-06);
+    vec3 t21 = (0.0 - t11 - t15 * t19) * t20;
+    t9 = (t9 - t15 * t6) * t20;
+    t10 = (t10 - t15 * t7) * t20;
+    t11 = (t11 - t15 * t8) * t20;
+    t15 = t19 - t18 * t21;
+    t19 = 1.0 / max(1.0 - t14 - t16 * t19 - t17 * t21, 1e-06);
+    t13 = (t13 - t16 * t7 - t17 * t10) * t19;
+    t14 = (t14 - t16 * t8 - t17 * t11) * t19;
+    bool lit2 = min(wi.w, wo.w) > 0.0;
+    float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_patina_coat.eta);
+    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_patina_coat.alpha);
+    float projection_i = lf_ggx_projection(wi, lf_patina_coat.alpha);
+    float projection_o = lf_ggx_projection(wo, lf_patina_coat.alpha);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float f = F * D * V;
-    Crossing i = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wi2, wi2);
-    Crossing o = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wo2, wo2);
+    Crossing i = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wi, wi);
+    Crossing o = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wo, wo);
     float throughput = i.T * o.T / (lf_patina_coat.eta * lf_patina_coat.eta);
-    float straight = 1.0 / max(i.w.z, 1e-14) + 1.0 / max(o.w.z, 1e-14);
+    float straight = (i.w.w + o.w.w) / (i.w.w * o.w.w);
     float added = i.lengthening + o.lengthening;
-    float sin_i = sqrt(max(wi2.x * wi2.x + wi2.y * wi2.y, 0.0));
-    float sin_o = sqrt(max(wo2.x * wo2.x + wo2.y * wo2.y, 0.0));
+    float sin_i = sqrt(dot(wi.xyz, wi.xyz));
+    float sin_o = sqrt(dot(wo.xyz, wo.xyz));
     float R_i = 1.0 - i.T;
     float R_o = 1.0 - o.T;
     vec3 directional = lf_transmittance(t + t2, straight + 0.5 * added);
-    wi2 = lf_steer(i.w, 0.5 * i.drift);
-    wo2 = lf_steer(o.w, 0.5 * o.drift);
-    vec3 h = lf_half_vector(wi2, wo2);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi2, wo2), lf_base.eta, lf_base.k);
+    vec4 wi2 = lf_steer(i.w, 0.5 * i.drift);
+    vec4 wo2 = lf_steer(o.w, 0.5 * o.drift);
+    vec4 h = lf_half_vector2(wi2, wo2);
+    vec3 F2 = lf_fresnel_conductor2(lf_half_cosine2(wi2, wo2), lf_base.eta, lf_base.k);
     float R = 0.5 * (R_i + R_o);
-    float edge_i = lf_edge_reflection(sin_i, i.w.z, lf_patina_interface.n, lf_base.alpha);
-    float edge_o = lf_edge_reflection(sin_o, o.w.z, lf_patina_interface.n, lf_base.alpha);
+    float edge_i = lf_edge_reflection(sin_i, i.w.w, lf_patina_interface.n, lf_base.alpha);
+    float edge_o = lf_edge_reflection(sin_o, o.w.w, lf_patina_interface.n, lf_base.alpha);
     vec3 q = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
-    float spread = (pow(max(i.spread, 1e-30), 1.34) + pow(max(o.spread, 1e-30), 1.34)) * pow(max(lf_patina_coat.alpha, 1e-30), 1.34);
-    float total7 = spread + 3.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
-    total7 = total7 + 2.0 * pow(max(lf_patina_coat.alpha, 1e-30), 1.34);
-    float width = min(pow(max(total7, 1e-30), 0.74626863), 1.5);
+    float spread = (pow(i.spread, 1.34) + pow(o.spread, 1.34)) * pow(lf_patina_coat.alpha, 1.34);
+    float total7 = spread + 3.0 * pow(lf_base.alpha, 1.34);
+    total7 = total7 + 2.0 * pow(lf_patina_coat.alpha, 1.34);
+    float width = pow(total7, 0.74626863);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
+    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
-    total7 = spread + 2.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
-    total7 = total7 + pow(max(lf_patina_coat.alpha, 1e-30), 1.34);
-    width = min(pow(max(total7, 1e-30), 0.74626863), 1.5);
+    total7 = spread + 2.0 * pow(lf_base.alpha, 1.34);
+    total7 = total7 + pow(lf_patina_coat.alpha, 1.34);
+    width = pow(total7, 0.74626863);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
+    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
-    total7 = spread + pow(max(lf_base.alpha, 1e-30), 1.34);
-    width = min(pow(max(total7, 1e-30), 0.74626863), 1.5);
+    total7 = spread + pow(lf_base.alpha, 1.34);
+    width = pow(total7, 0.74626863);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
+    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * directional * F2 * lobes;
-    float path = 1.0 / max(i.w.z, 1e-14);
+    float path = 1.0 / i.w.w;
     path = path + i.lengthening;
-    float path2 = 1.0 / max(o.w.z, 1e-14);
+    float path2 = 1.0 / o.w.w;
     path2 = path2 + o.lengthening;
     vec3 f3 = lf_once_back(0.07957747, t2, t3, path, path2);
     Fluence beam_i = lf_fluence(t3, path);
     Fluence beam_o = lf_fluence(t3, path2);
-    vec3 up_i = lf_fresnel_conductor(i.w.z, lf_base.eta, lf_base.k) * exp(-t3 * path);
-    vec3 up_o = lf_fresnel_conductor(o.w.z, lf_base.eta, lf_base.k) * exp(-t3 * path2);
+    vec3 up_i = lf_fresnel_conductor3(i.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path);
+    vec3 up_o = lf_fresnel_conductor3(o.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path2);
     vec3 f4 = lf_once_by_mirror(0.07957747, 0.07957747, t2, t3, path, path2, up_i, up_o);
     f3 = f3 + f4;
-    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor(i.w.z, lf_base.eta, lf_base.k), R_i);
-    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor(o.w.z, lf_base.eta, lf_base.k), R_o);
-    f2 = f2 + throughput * (f3 + lf_exchanged(Haze(t3, (t7 - t19 * t10 - t16 * ((t13 - t17 * t7 - t18 * t10) * t20)) * t4, (t8 - t19 * t11 - t16 * t14) * t4, (t9 - t19 * t12 - t16 * t15) * t4, (t11 - t22 * t14) * t4, (t12 - t22 * t15) * t4, t15 * t4), beam_i, beam_o));
+    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor3(i.w.w, lf_base.eta, lf_base.k), R_i);
+    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor3(o.w.w, lf_base.eta, lf_base.k), R_o);
+    f2 = f2 + throughput * (f3 + lf_exchanged(Haze(t3, (t6 - t18 * t9 - t15 * ((t12 - t16 * t6 - t17 * t9) * t19)) * t4, (t7 - t18 * t10 - t15 * t13) * t4, (t8 - t18 * t11 - t15 * t14) * t4, (t10 - t21 * t13) * t4, (t11 - t21 * t14) * t4, t14 * t4), beam_i, beam_o));
     vec3 patina = lit2 ? f2 : vec3(0.0);
     TwoFlux layer = lf_kubelka_munk(lf_patina_crust.absorbed * thickness, lf_patina_crust.scattered * thickness);
     vec3 diffuse = layer.R / 3.1415927;
     patina = patina + diffuse;
-    F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_base_bare.eta, lf_base_bare.k);
+    F2 = lf_fresnel_conductor2(lf_half_cosine(wi, wo), lf_base_bare.eta, lf_base_bare.k);
     D = lf_ggx_d(lf_half_vector(wi, wo), lf_base_bare.alpha);
     projection_i = lf_ggx_projection(wi, lf_base_bare.alpha);
     projection_o = lf_ggx_projection(wo, lf_base_bare.alpha);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     vec3 bare = F2 * D * V;
     f2 = cover.bare * bare + cover.covered * patina;
     return lit ? f2 : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l, vec2 uv) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v, uv);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV), uv);
 }
 
 #ifndef LF_LIBRARY

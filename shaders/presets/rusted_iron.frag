@@ -47,7 +47,7 @@ const Pigment lf_rust_pigment = Pigment(
     vec3(0.060000002, 0.030000001, 0.012),  // S: scattering of diffuse light [1/um]
     0.7,                                    // alpha: width of the facet slopes of its boundary
     1.9,                                    // eta: index of refraction, against air
-    0.23615639                              // escape: part of diffuse light from below that passes its boundary
+    0.23615637                              // escape: part of diffuse light from below that passes its boundary
 );
 
 const Growth lf_rust_growth = Growth(
@@ -157,42 +157,42 @@ vec3 lf_kubelka_munk_over(TwoFlux layer, vec3 substrate) {
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -202,18 +202,17 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // BRDF [1/sr] of a diffuse body of this albedo below a smooth boundary (Saunderson 1942, per direction).
-vec3 lf_below_boundary(vec3 wi, vec3 wo, float eta, float escape, vec3 albedo) {
-    float T = lf_transmittance_dielectric(wi.z, eta) * lf_transmittance_dielectric(wo.z, eta);
+vec3 lf_below_boundary(vec4 wi, vec4 wo, float eta, float escape, vec3 albedo) {
+    float T = lf_transmittance_dielectric(wi.w, eta) * lf_transmittance_dielectric(wo.w, eta);
     vec3 kept = max(1.0 - albedo + albedo * escape, 1e-06);
     return T / (eta * eta) * (albedo / 3.1415927) / kept;
 }
@@ -221,27 +220,22 @@ vec3 lf_below_boundary(vec3 wi, vec3 wo, float eta, float escape, vec3 albedo) {
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + abs(p)));
     vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     Cover cover = lf_cover_at(lf_field_at(uv, lf_rust_growth), lf_rust_growth);
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    bool lit = min(wi.w, wo.w) > 0.0;
     float t = cover.covered * lf_rust_pigment.thickness;
     float through = lf_see_through(t);
     float share = 1.0 - through;
@@ -251,27 +245,24 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv) {
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_rust_pigment.alpha);
     float projection_i = lf_ggx_projection(wi, lf_rust_pigment.alpha);
     float projection_o = lf_ggx_projection(wo, lf_rust_pigment.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float boundary = F * D * V;
     vec3 body = lf_below_boundary(wi, wo, lf_rust_pigment.eta, lf_rust_pigment.escape, albedo);
     vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_iron.eta, lf_iron.k);
     D = lf_ggx_d(lf_half_vector(wi, wo), lf_iron.alpha);
     projection_i = lf_ggx_projection(wi, lf_iron.alpha);
     projection_o = lf_ggx_projection(wo, lf_iron.alpha);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     vec3 metal = F2 * D * V;
     vec3 f = share * (boundary + body) + through * metal;
     return lit ? f : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l, vec2 uv) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v, uv);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV), uv);
 }
 
 #ifndef LF_LIBRARY

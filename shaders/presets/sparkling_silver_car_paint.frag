@@ -46,7 +46,7 @@ const CarPaint lf_paint = CarPaint(
 // Part of the tilt of flakes that is still drawn flake by flake: 1 near by, 1/2 at `half_distance`, 0 far off.
 float lf_kept_tilt(float distance, float half_distance) {
     float ratio = distance / half_distance;
-    return 1.0 / (1.0 + abs(ratio * ratio));
+    return 1.0 / (1.0 + ratio * ratio);
 }
 
 // Three hashed words of three words (Jarzynski and Olano 2020, listing 5).
@@ -73,32 +73,47 @@ uvec3 lf_hash_cell(vec2 cell, uint seed) {
 // -log(1 - u) for u in (0, 1), with all digits at both ends; `complement` is 1 - u with its own.
 float lf_exponential(float u, float complement) {
     bool small = complement < 1.5258789e-05;
-    float x = small ? complement * 65536.0 : complement;
+    float value = complement * 65536.0;
+    float x = small ? value : complement;
     float halvings = small ? 16.0 : 0.0;
     small = x < 0.00390625;
-    x = small ? x * 256.0 : x;
-    halvings = small ? halvings + 8.0 : halvings;
+    value = x * 256.0;
+    x = small ? value : x;
+    value = halvings + 8.0;
+    halvings = small ? value : halvings;
     small = x < 0.0625;
-    x = small ? x * 16.0 : x;
-    halvings = small ? halvings + 4.0 : halvings;
+    value = x * 16.0;
+    x = small ? value : x;
+    value = halvings + 4.0;
+    halvings = small ? value : halvings;
     small = x < 0.25;
-    x = small ? x * 4.0 : x;
-    halvings = small ? halvings + 2.0 : halvings;
+    value = x * 4.0;
+    x = small ? value : x;
+    value = halvings + 2.0;
+    halvings = small ? value : halvings;
     small = x < 0.5;
-    x = small ? x * 2.0 : x;
-    halvings = small ? halvings + 1.0 : halvings;
+    value = x * 2.0;
+    x = small ? value : x;
+    value = halvings + 1.0;
+    halvings = small ? value : halvings;
     small = x < 0.70710677;
-    x = small ? x * 2.0 : x;
-    halvings = small ? halvings + 1.0 : halvings;
+    value = x * 2.0;
+    x = small ? value : x;
+    value = halvings + 1.0;
+    halvings = small ? value : halvings;
     bool near = u < 0.25;
-    float s = (near ? (-u) : x - 1.0) / (near ? 2.0 - u : x + 1.0);
+    value = x - 1.0;
+    float value2 = x + 1.0;
+    float value3 = 2.0 - u;
+    float s = (near ? (-u) : value) / (near ? value3 : value2);
     float s2 = s * s;
-    float total = abs(0.0 * s2) + 0.11111111;
-    total = abs(total * s2) + 0.14285715;
-    total = abs(total * s2) + 0.2;
-    total = abs(total * s2) + 0.33333334;
-    total = abs(total * s2) + 1.0;
-    return (near ? 0.0 : abs(halvings * 0.6931472)) - 2.0 * (s * total);
+    float total = 0.0 * s2 + 0.11111111;
+    total = total * s2 + 0.14285715;
+    total = total * s2 + 0.2;
+    total = total * s2 + 0.33333334;
+    total = total * s2 + 1.0;
+    value = halvings * 0.6931472;
+    return (near ? 0.0 : value) - 2.0 * (s * total);
 }
 
 // Point of the unit circle, u turns from (1, 0); u in [0, 1].
@@ -106,12 +121,12 @@ vec2 lf_circle(float u) {
     float quarter = floor(4.0 * u + 0.5);
     float x = 6.2831855 * (u - 0.25 * quarter);
     float x2 = x * x;
-    float total = 1.0 - abs(x2 / 90.0);
+    float total = 1.0 - x2 / 90.0;
     total = 1.0 - abs(x2 * total / 56.0);
     total = 1.0 - abs(x2 * total / 30.0);
     total = 1.0 - abs(x2 * total / 12.0);
     total = 1.0 - abs(x2 * total / 2.0);
-    float total2 = 1.0 - abs(x2 / 110.0);
+    float total2 = 1.0 - x2 / 110.0;
     total2 = 1.0 - abs(x2 * total2 / 72.0);
     total2 = 1.0 - abs(x2 * total2 / 42.0);
     total2 = 1.0 - abs(x2 * total2 / 20.0);
@@ -146,13 +161,14 @@ float lf_lost_variance(float distance, float half_distance) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Schlick 1994, eq. 15, from the reflectance at normal incidence.
@@ -174,15 +190,19 @@ float lf_tilted_d(vec3 h, vec2 tilt, float alpha) {
     float x = h.x - h.z * tilt.x;
     float y = h.y - h.z * tilt.y;
     bool above = h.z > 1e-04;
-    float inverse = 1.0 / (above ? h.z * h.z : 1.0);
-    return above ? exp(-((x * x + y * y) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha)) : 0.0;
+    float value = h.z * h.z;
+    float inverse = 1.0 / (above ? value : 1.0);
+    value = exp(-((x * x + y * y) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha));
+    return above ? value : 0.0;
 }
 
 // Beckmann density of facet normals (Cook and Torrance 1982, eq. 14, normalised).
 float lf_beckmann_d(vec3 h, float alpha) {
     bool above = h.z > 1e-04;
-    float inverse = 1.0 / (above ? h.z * h.z : 1.0);
-    return above ? exp(-((h.x * h.x + h.y * h.y) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha)) : 0.0;
+    float value = h.z * h.z;
+    float inverse = 1.0 / (above ? value : 1.0);
+    value = exp(-(dot(h.xy, h.xy) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha));
+    return above ? value : 0.0;
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
@@ -190,9 +210,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float kept = lf_kept_tilt(distance, lf_paint.half_distance);
     vec2 slope = lf_flake_tilt(uv, lf_paint.per_uv, kept, uint(lf_paint.seed));
     float lost = lf_lost_variance(distance, lf_paint.half_distance);
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+    bool lit = min(wi.z, wo.z) > 0.0;
     vec3 h = lf_half_vector(wi, wo);
     float c = lf_half_cosine(wi, wo);
     float V = lf_v_cavity(wi, wo);
@@ -203,7 +221,8 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float own2 = whole * (1.0 - lf_paint.sparkle_2) + lost * (lf_paint.sparkle_2 * whole);
     float V3 = lf_v_cavity(wi, wo);
     float D = lf_beckmann_d(h, lf_paint.alpha_3);
-    return lit ? 4.0 * lf_paint.ks * lf_fresnel_schlick(c, lf_paint.f0) * (lf_tilted_d(h, sqrt(max(lf_paint.sparkle, 0.0)) * lf_paint.alpha * slope, sqrt(max(own, 0.0))) * V) + 4.0 * lf_paint.ks_2 * lf_fresnel_schlick(c, lf_paint.f0_2) * (lf_tilted_d(h, sqrt(max(lf_paint.sparkle_2, 0.0)) * lf_paint.alpha_2 * slope, sqrt(max(own2, 0.0))) * V2) + 4.0 * lf_paint.ks_3 * lf_fresnel_schlick(c, lf_paint.f0_3) * (D * V3) + lf_paint.kd / 3.1415927 : vec3(0.0);
+    vec3 value = 4.0 * lf_paint.ks * lf_fresnel_schlick(c, lf_paint.f0) * (lf_tilted_d(h, sqrt(lf_paint.sparkle) * lf_paint.alpha * slope, sqrt(own)) * V) + 4.0 * lf_paint.ks_2 * lf_fresnel_schlick(c, lf_paint.f0_2) * (lf_tilted_d(h, sqrt(lf_paint.sparkle_2) * lf_paint.alpha_2 * slope, sqrt(own2)) * V2) + 4.0 * lf_paint.ks_3 * lf_fresnel_schlick(c, lf_paint.f0_3) * (D * V3) + lf_paint.kd / 3.1415927;
+    return lit ? value : vec3(0.0);
 }
 
 // BRDF [1/sr] in any frame; t is a tangent, along which alpha_x is measured.

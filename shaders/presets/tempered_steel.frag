@@ -23,28 +23,29 @@ struct Conductor {
 };
 
 const Conductor lf_steel = Conductor(
-    vec3(0.03240338, 0.19607608, 0.3290605),              // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
-    vec3(0.027525919, -0.015125342, 0.105232716),         // film_1: degree 1
-    vec3(-0.018811513, 0.005813442, -0.008089341),        // film_2: degree 2
-    vec3(0.004811612, 0.011170484, -0.0022683144),        // film_3: degree 3
-    vec3(0.0092099495, 0.005291844, 0.007123787),         // film_4: degree 4
-    vec3(0.00048414432, 0.0003696736, 0.00019676238),     // film_5: degree 5
-    vec3(-0.00088953855, -0.0006940644, -0.0010248665),   // film_6: degree 6
-    vec3(-0.0002441611, -0.00027994812, -0.00011635944),  // film_7: degree 7
-    vec3(-2.4970417e-05, -2.1389686e-05, 4.128553e-05),   // film_8: degree 8
-    vec3(3.4855213e-05, 3.9458275e-05, 8.948147e-06),     // film_9: degree 9
-    0.15                                                  // alpha: width of the facet slopes; the square of an artist's roughness
+    vec3(0.032403372, 0.19607608, 0.3290605),              // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
+    vec3(0.027525928, -0.015125342, 0.105232745),          // film_1: degree 1
+    vec3(-0.018811516, 0.005813446, -0.008089356),         // film_2: degree 2
+    vec3(0.00481161, 0.011170484, -0.0022683218),          // film_3: degree 3
+    vec3(0.009209958, 0.0052918363, 0.0071238074),         // film_4: degree 4
+    vec3(0.00048413128, 0.00036968663, 0.00019672886),     // film_5: degree 5
+    vec3(-0.0008895246, -0.00069407746, -0.0010248311),    // film_6: degree 6
+    vec3(-0.00024417322, -0.0002799332, -0.000116389245),  // film_7: degree 7
+    vec3(-2.4962035e-05, -2.1397136e-05, 4.130788e-05),    // film_8: degree 8
+    vec3(3.4851488e-05, 3.9462e-05, 8.936971e-06),         // film_9: degree 9
+    0.15                                                   // alpha: width of the facet slopes; the square of an artist's roughness
 );
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
 float lf_chebyshev_argument(float c) {
-    return max((2.0 * sqrt(max(c, 0.0)) - 1.06) / 0.94, -1.0);
+    return max((2.0 * sqrt(c) - 1.06) / 0.94, -1.0);
 }
 
 // What Schlick's formula takes for f0 of a metal with a film, in daylight.
@@ -69,21 +70,21 @@ vec3 lf_fresnel_schlick(float c, vec3 f0) {
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -91,11 +92,9 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float t = lf_half_cosine(wi, wo);
     vec3 reflected = lf_fresnel_schlick(t, lf_film_on_metal(lf_steel, t));
     vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
@@ -103,18 +102,16 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_steel.alpha);
     float projection_i = lf_ggx_projection(wi, lf_steel.alpha);
     float projection_o = lf_ggx_projection(wo, lf_steel.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    return lit ? F * D * V : vec3(0.0);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    vec3 value = F * D * V;
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

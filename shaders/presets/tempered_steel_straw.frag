@@ -23,28 +23,29 @@ struct Conductor {
 };
 
 const Conductor lf_steel = Conductor(
-    vec3(0.34943533, 0.30135942, 0.21502486),              // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
-    vec3(-0.036628664, -0.07573825, -0.12264327),          // film_1: degree 1
-    vec3(-0.023409467, -0.025867227, -0.026050806),        // film_2: degree 2
-    vec3(-0.00060678273, 0.003419079, 0.0092025995),       // film_3: degree 3
-    vec3(0.005148992, 0.005586244, 0.0060648285),          // film_4: degree 4
-    vec3(0.0011146776, 0.00088808313, 0.0005527586),       // film_5: degree 5
-    vec3(-0.000572782, -0.00058862194, -0.00066625327),    // film_6: degree 6
-    vec3(-0.00025307387, -0.0002654791, -0.0002891291),    // film_7: degree 7
-    vec3(-1.1311844e-05, -2.9921532e-05, -4.4394284e-05),  // film_8: degree 8
-    vec3(2.1521002e-05, 2.6971102e-05, 3.4781173e-05),     // film_9: degree 9
-    0.15                                                   // alpha: width of the facet slopes; the square of an artist's roughness
+    vec3(0.3494353, 0.30135942, 0.21502486),              // film_0: f0 of the film, which depends on the angle, by Chebyshev polynomials of sqrt(c): degree 0
+    vec3(-0.03662865, -0.07573825, -0.12264323),          // film_1: degree 1
+    vec3(-0.02340946, -0.02586722, -0.026050832),         // film_2: degree 2
+    vec3(-0.0006067753, 0.0034190938, 0.009202592),       // film_3: degree 3
+    vec3(0.005148992, 0.0055862367, 0.006064836),         // film_4: degree 4
+    vec3(0.0011146665, 0.00088808313, 0.00055275485),     // film_5: degree 5
+    vec3(-0.000572782, -0.00058862567, -0.0006662626),    // film_6: degree 6
+    vec3(-0.0002530776, -0.00026546046, -0.00028911978),  // film_7: degree 7
+    vec3(-1.1313707e-05, -2.990663e-05, -4.4407323e-05),  // film_8: degree 8
+    vec3(2.1539629e-05, 2.694875e-05, 3.479235e-05),      // film_9: degree 9
+    0.15                                                  // alpha: width of the facet slopes; the square of an artist's roughness
 );
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
 float lf_chebyshev_argument(float c) {
-    return max((2.0 * sqrt(max(c, 0.0)) - 1.06) / 0.94, -1.0);
+    return max((2.0 * sqrt(c) - 1.06) / 0.94, -1.0);
 }
 
 // What Schlick's formula takes for f0 of a metal with a film, in daylight.
@@ -69,21 +70,21 @@ vec3 lf_fresnel_schlick(float c, vec3 f0) {
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -91,11 +92,9 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float t = lf_half_cosine(wi, wo);
     vec3 reflected = lf_fresnel_schlick(t, lf_film_on_metal(lf_steel, t));
     vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
@@ -103,18 +102,16 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_steel.alpha);
     float projection_i = lf_ggx_projection(wi, lf_steel.alpha);
     float projection_o = lf_ggx_projection(wo, lf_steel.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    return lit ? F * D * V : vec3(0.0);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    vec3 value = F * D * V;
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

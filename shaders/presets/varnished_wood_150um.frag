@@ -34,7 +34,7 @@ struct OrenNayar {
 };
 
 struct Crossing {
-    vec3 w;       // median direction
+    vec4 w;       // median direction
     float T;      // energy that passes
     float a;      // spread, as a width
     float path;   // mean path, in thicknesses
@@ -98,23 +98,22 @@ float lf_atan2(float y, float x) {
 
 // Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+float lf_facet_cosine(vec4 w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -129,59 +128,59 @@ float lf_curve(vec4 low, vec4 high, float s) {
 }
 
 // Follow one direction through the coat's rough top.
-Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w) {
-    float s = lf_grazing(w.z);
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w) {
+    float s = lf_grazing(w.w);
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
     float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    float sine = sqrt(dot(w.xyz, w.xyz));
     bend = min(bend, 0.9998 / max(sine, 1e-06));
     sine = sine * bend;
     float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
-    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -191,33 +190,35 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 
 // Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
 vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    float scale = max(theta, 1e-06);
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
+    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(theta * tau) / theta)));
 }
 
 // Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection.
-vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
+vec3 lf_oren_nayar_full(vec4 wi, vec4 wo, vec3 albedo, float sigma) {
     float sigma2 = sigma * sigma;
     float c1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33);
     float c2 = 0.45 * sigma2 / (sigma2 + 0.09);
     float c3 = 0.125 * sigma2 / (sigma2 + 0.09);
     float c4 = 0.17 * sigma2 / (sigma2 + 0.13);
-    float sin_i = sqrt(max(wi.x * wi.x + wi.y * wi.y, 0.0));
-    float sin_o = sqrt(max(wo.x * wo.x + wo.y * wo.y, 0.0));
-    float elevation_i = lf_atan2(wi.z, sin_i) * 0.63661975;
-    float elevation_o = lf_atan2(wo.z, sin_o) * 0.63661975;
+    float sin_i = sqrt(dot(wi.xyz, wi.xyz));
+    float sin_o = sqrt(dot(wo.xyz, wo.xyz));
+    float elevation_i = lf_atan2(wi.w, sin_i) * 0.63661975;
+    float elevation_o = lf_atan2(wo.w, sin_o) * 0.63661975;
     float higher = max(elevation_i, elevation_o);
-    float lower_cos = min(wi.z, wo.z);
-    float larger_cos = max(wi.z, wo.z);
+    float lower_cos = min(wi.w, wo.w);
+    float larger_cos = max(wi.w, wo.w);
     float larger_sin = max(sin_i, sin_o);
-    float dot_xy = wi.x * wo.x + wi.y * wo.y;
+    float dot_xy = dot(wi.xyz, wo.xyz);
     float cos_phi = dot_xy / max(sin_i * sin_o, 1e-14);
-    float sin_phi = (wi.x * wo.y - wi.y * wo.x) / max(sin_i * sin_o, 1e-14);
-    float aside = sin_phi * sin_phi / (1.0 + abs(cos_phi));
+    vec3 azimuth_i = wi.xyz / max(sin_i, 1e-14);
+    vec3 azimuth_o = wo.xyz / max(sin_o, 1e-14);
+    bool facing = dot_xy < 0.0;
+    vec3 apart = azimuth_i + (facing ? azimuth_o : (-azimuth_o));
+    float aside = 0.5 * dot(apart, apart);
     float forward = dot_xy / larger_cos;
     float gap = higher * (3.0 - higher * (3.0 - higher)) - lower_cos * lower_cos / (1.0 + larger_sin);
     float backward = dot_xy * gap / max(larger_cos * larger_sin, 1e-14);
-    float tan_mean = (sin_i + sin_o) / (wi.z + wo.z);
+    float tan_mean = (sin_i + sin_o) / (wi.w + wo.w);
     float smaller = 1.0 - higher;
     float product = smaller * (1.0 - min(elevation_i, elevation_o));
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
@@ -226,31 +227,27 @@ vec3 lf_oren_nayar_full(vec3 wi, vec3 wo, vec3 albedo, float sigma) {
     return albedo / 3.1415927 * max(direct + albedo * interreflected, 0.0);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     Crossing crossing = lf_pass_interface(lf_varnish_interface, lf_varnish.eta, lf_varnish.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_varnish_interface, lf_varnish.eta, lf_varnish.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_varnish.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_varnish.alpha);
     float projection_i = lf_ggx_projection(wi, lf_varnish.alpha);
     float projection_o = lf_ggx_projection(wo, lf_varnish.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_varnish.eta * lf_varnish.eta);
     vec3 A = lf_absorbed(crossing.path, crossing.theta, lf_varnish.tau) * lf_absorbed(crossing2.path, crossing2.theta, lf_varnish.tau);
-    return lit ? F * D * V + throughput * A * lf_oren_nayar_full(crossing.w, crossing2.w, lf_wood.albedo, lf_wood.sigma) / max(1.0 - lf_wood.albedo * lf_wood_returned, 1e-06) : vec3(0.0);
+    vec3 value = F * D * V + throughput * A * lf_oren_nayar_full(crossing.w, crossing2.w, lf_wood.albedo, lf_wood.sigma) / (1.0 - lf_wood.albedo * lf_wood_returned);
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

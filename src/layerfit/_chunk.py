@@ -10,7 +10,7 @@ import dataclasses
 import json
 import operator
 from collections.abc import Callable
-from functools import partial
+from functools import partial, reduce
 from typing import Any, TypeVar, cast, dataclass_transform
 
 import jax
@@ -84,8 +84,8 @@ def struct(cls: type[T]) -> type[T]:
 
 @jax.jit
 def dot(a: jax.Array, b: jax.Array) -> jax.Array:
-    """Dot product of two 3-vectors, GLSL's `dot`. Written out: for `jnp.dot` the compiler calls a library, for three products."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    """Dot product of two vectors, GLSL's `dot`. Written out: for `jnp.dot` the compiler calls a library, for three products."""
+    return reduce(operator.add, (a[k] * b[k] for k in range(len(a))))
 
 
 @jax.jit
@@ -104,6 +104,12 @@ def vec3(x: jax.Array) -> jax.Array:
 def vec4(x: jax.Array) -> jax.Array:
     """Likewise."""
     return jnp.full(4, x)
+
+
+@jax.jit
+def fetch(table: jax.Array, k: jax.Array) -> jax.Array:
+    """A row of a table, GLSL's `table[k]`."""
+    return table[k]
 
 
 def where(condition: Any, x: Any, y: Any) -> jax.Array:

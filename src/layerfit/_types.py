@@ -13,6 +13,8 @@ Flag = Bool[Array, ""]
 Vec2 = Float[Array, "2"]
 Vec3 = Float[Array, "3"]
 Vec4 = Float[Array, "4"]
+Direction = Float[Array, "3"] | Float[Array, "4"]
+"""Unit vector: its part along the surface, two numbers in the surface's frame or three in any space, then its cosine."""
 UInt = UInt32[Array, ""]
 UVec3 = UInt32[Array, "3"]
 Colour = Float[Array, ""] | Float[Array, "3"]

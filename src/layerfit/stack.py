@@ -13,8 +13,9 @@ from ._compiled import Compiled
 from ._fields import Param, params
 from ._html import table
 from ._place import Place, needs, reads
-from ._types import Colour, Vec3
+from ._types import Colour, Direction
 from .forms import corrected, faithful, patina, precise, weathering
+from .optics.directions import above, both_above
 
 Form = faithful.Faithful | corrected.Corrected | precise.Precise
 FORMS = {faithful.Faithful: faithful, corrected.Corrected: corrected, precise.Precise: precise}
@@ -108,15 +109,12 @@ def at(prepared: Any, place: Place | None) -> Any:
     return prepared.at(place) if reads(prepared) else prepared
 
 
-def evaluate(form: Form, prepared: Any, wi: Vec3, wo: Vec3) -> Colour:
+def evaluate(form: Form, prepared: Any, wi: Direction, wo: Direction) -> Colour:
     """BRDF [1/sr] of a prepared material for unit directions in the surface frame; 0 below the surface."""
     for kind in IN_TIME:
         if isinstance(prepared, kind.Prepared):
             return kind.evaluate(prepared, wi, wo, form)
     if isinstance(prepared, PREPARED):
         return FORMS[type(form)].evaluate(prepared, wi, wo, form)
-    lit = (wi[2] > 0.0) & (wo[2] > 0.0)
-    up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = where(lit, wi, up)
-    wo = where(lit, wo, up)
-    return where(lit, prepared.evaluate(wi, wo), 0.0)
+    lit = both_above(wi, wo)
+    return where(lit, prepared.evaluate(above(lit, wi), above(lit, wo)), 0.0)

@@ -27,7 +27,7 @@ struct Lambert {
 };
 
 struct Crossing {
-    vec3 w;             // direction in the medium below
+    vec4 w;             // direction in the medium below
     float T;            // energy that passes
     float spread;       // width of the refracted directions over that of the facets
     float lengthening;  // path beyond that of the refracted direction, in thicknesses
@@ -43,10 +43,10 @@ const Coat lf_coat = Coat(
 const Interface lf_coat_interface = Interface(
     1.5,           // n: index of the medium below, against air
     0.1,           // alpha: width of the facets, mean of the axes
-    0.024779007,   // tilt: turn of the mean facet towards a grazing direction
+    0.024779005,   // tilt: turn of the mean facet towards a grazing direction
     0.036722906,   // gain: part of the reflected light that a second facet lets in
     0.0025420089,  // lengthening: path added by the spread of refracted directions, in thicknesses
-    0.6249986      // drift: scale of the path added at grazing angles
+    0.62499845     // drift: scale of the path added at grazing angles
 );
 
 const Lambert lf_base = Lambert(
@@ -56,42 +56,42 @@ const Lambert lf_base = Lambert(
 const vec3 lf_base_returned = vec3(1.3041564, 1.076677, 1.008228);
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -100,19 +100,18 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+float lf_facet_cosine(vec4 w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -121,31 +120,30 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+float lf_drift(vec4 w, float scale, float alpha) {
+    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
     return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec3 lf_refract_about_normal(vec3 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
-    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+vec4 lf_refract_about_normal(vec4 w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.w * w.w;
+    return vec4(w.xyz, sqrt(z2)) * (1.0 / eta);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
 float lf_slope_spread(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
-    float g = sqrt(max(delta + c * c, 0.0));
-    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
+    float g = sqrt(delta + c * c);
+    return 0.5 * delta / (g * (g + c));
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
+Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c_energy = coat.eta >= 1.0 ? c : w.z;
-    float T = lf_with_second_facet(lf_transmittance_dielectric(c_energy, coat.eta), interface_.gain);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(c, coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    vec3 below = lf_refract_about_normal(air, interface_.n);
+    vec4 below = lf_refract_about_normal(air, interface_.n);
     return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
@@ -154,21 +152,19 @@ vec3 lf_transmittance(vec3 tau, float path) {
     return exp(-(tau * path));
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_coat.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float f = F * D * V;
     Crossing i = lf_cross(lf_coat_interface, lf_coat, wi, wi);
     Crossing o = lf_cross(lf_coat_interface, lf_coat, wo, wo);
     float throughput = i.T * o.T / (lf_coat.eta * lf_coat.eta);
-    float straight = 1.0 / max(i.w.z, 1e-14) + 1.0 / max(o.w.z, 1e-14);
+    float straight = (i.w.w + o.w.w) / (i.w.w * o.w.w);
     float added = i.lengthening + o.lengthening;
     vec3 diffuse = lf_transmittance(lf_coat.tau, straight + added);
     vec3 reflected = lf_base.albedo / 3.1415927 * lf_base_returned;
@@ -176,14 +172,11 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     return lit ? f2 : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

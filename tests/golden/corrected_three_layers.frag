@@ -30,7 +30,7 @@ struct Conductor {
 };
 
 struct Crossing {
-    vec3 w;             // direction in the medium below
+    vec4 w;             // direction in the medium below
     float T;            // energy that passes
     float spread;       // width of the refracted directions over that of the facets
     float lengthening;  // path beyond that of the refracted direction, in thicknesses
@@ -52,10 +52,10 @@ const Coat lf_primer = Coat(
 const Interface lf_coat_interface = Interface(
     1.5,           // n: index of the medium below, against air
     0.1,           // alpha: width of the facets, mean of the axes
-    0.024779007,   // tilt: turn of the mean facet towards a grazing direction
+    0.024779005,   // tilt: turn of the mean facet towards a grazing direction
     0.036722906,   // gain: part of the reflected light that a second facet lets in
     0.0025420089,  // lengthening: path added by the spread of refracted directions, in thicknesses
-    0.6249986      // drift: scale of the path added at grazing angles
+    0.62499845     // drift: scale of the path added at grazing angles
 );
 
 const Interface lf_primer_interface = Interface(
@@ -74,42 +74,42 @@ const Conductor lf_base = Conductor(
 );
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -118,19 +118,18 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+float lf_facet_cosine(vec4 w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -139,31 +138,30 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+float lf_drift(vec4 w, float scale, float alpha) {
+    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
     return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec3 lf_refract_about_normal(vec3 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
-    return vec3(w.x, w.y, sqrt(max(z2, 0.0))) / eta;
+vec4 lf_refract_about_normal(vec4 w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.w * w.w;
+    return vec4(w.xyz, sqrt(z2)) * (1.0 / eta);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
 float lf_slope_spread(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
-    float g = sqrt(max(delta + c * c, 0.0));
-    return 0.5 * abs(delta) / max(g * (g + c), 1e-14);
+    float g = sqrt(delta + c * c);
+    return 0.5 * delta / (g * (g + c));
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
+Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c_energy = coat.eta >= 1.0 ? c : w.z;
-    float T = lf_with_second_facet(lf_transmittance_dielectric(c_energy, coat.eta), interface_.gain);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(c, coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    vec3 below = lf_refract_about_normal(air, interface_.n);
+    vec4 below = lf_refract_about_normal(air, interface_.n);
     return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
@@ -173,156 +171,196 @@ vec3 lf_transmittance(vec3 tau, float path) {
 }
 
 // Turn a direction, azimuth kept, until its path 1 / w.z is longer by `lengthening`.
-vec3 lf_steer(vec3 w, float lengthening) {
-    float z = w.z / max(1.0 + lengthening * w.z, 1e-14);
-    float sine2 = w.x * w.x + w.y * w.y;
-    float growth = lengthening * z * w.z * (w.z + z) / max(sine2, 1e-14);
-    float ratio = sqrt(max(1.0 + growth, 0.0));
-    return vec3(w.x * ratio, w.y * ratio, z);
+vec4 lf_steer(vec4 w, float lengthening) {
+    float z = w.w / (1.0 + lengthening * w.w);
+    float growth = lengthening * z * w.w * (w.w + z) / max(dot(w.xyz, w.xyz), 1e-14);
+    float ratio = sqrt(1.0 + growth);
+    return vec4(w.xyz * ratio, z);
+}
+
+// The unit vector halfway between two directions on the same side of the surface.
+vec4 lf_half_vector2(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(dot(s, s));
+}
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine2(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = dot(s, s);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+}
+
+// Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
+float lf_fresnel_dielectric2(float c, float eta) {
+    float delta = (eta - 1.0) * (eta + 1.0);
+    float g2 = delta + c * c;
+    bool refracts = g2 > 1e-08;
+    float g = sqrt(refracts ? g2 : 1.0);
+    float eta2 = eta * eta;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (rs * rs + rp * rp);
+    return refracts ? reflectance : 1.0;
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
-    float m = 0.5 * (1.0 - sine) / max(n * cosine, 1e-14);
-    return n > 1.0 ? 0.5 - 0.5 * m / max(sqrt(max(alpha * alpha + m * m, 0.0)), 1e-14) : 0.0;
+    float m = 0.5 * (1.0 - sine) / (n * cosine);
+    return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
+}
+
+// Width of the refracted directions over the width of the facets, to first order in slope.
+float lf_slope_spread2(float c, float eta) {
+    float delta = (eta - 1.0) * (eta + 1.0);
+    float g = sqrt(delta + c * c);
+    return 0.5 * (-delta) / (g * (g + c));
+}
+
+// Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
+Crossing lf_cross2(Interface interface_, Coat coat, vec4 w, vec4 air) {
+    float c = lf_facet_cosine(w, interface_.tilt);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(w.w, coat.eta), interface_.gain);
+    float grazing = lf_drift(w, interface_.drift, interface_.alpha);
+    vec4 below = lf_refract_about_normal(air, interface_.n);
+    return Crossing(below, T, lf_slope_spread2(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_coat.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float f = F * D * V;
     Crossing i = lf_cross(lf_coat_interface, lf_coat, wi, wi);
     Crossing o = lf_cross(lf_coat_interface, lf_coat, wo, wo);
     float throughput = i.T * o.T / (lf_coat.eta * lf_coat.eta);
-    float straight = 1.0 / max(i.w.z, 1e-14) + 1.0 / max(o.w.z, 1e-14);
+    float straight = (i.w.w + o.w.w) / (i.w.w * o.w.w);
     float added = i.lengthening + o.lengthening;
-    float sin_i = sqrt(max(wi.x * wi.x + wi.y * wi.y, 0.0));
-    float sin_o = sqrt(max(wo.x * wo.x + wo.y * wo.y, 0.0));
+    float sin_i = sqrt(dot(wi.xyz, wi.xyz));
+    float sin_o = sqrt(dot(wo.xyz, wo.xyz));
     float R_i = 1.0 - i.T;
     float R_o = 1.0 - o.T;
     vec3 directional = lf_transmittance(lf_coat.tau, straight + 0.5 * added);
-    vec3 wi2 = lf_steer(i.w, 0.5 * i.drift);
-    vec3 wo2 = lf_steer(o.w, 0.5 * o.drift);
-    vec3 h = lf_half_vector(wi2, wo2);
-    F = lf_fresnel_dielectric(lf_half_cosine(wi2, wo2), lf_primer.eta);
+    vec4 wi2 = lf_steer(i.w, 0.5 * i.drift);
+    vec4 wo2 = lf_steer(o.w, 0.5 * o.drift);
+    vec4 h = lf_half_vector2(wi2, wo2);
+    F = lf_fresnel_dielectric2(lf_half_cosine2(wi2, wo2), lf_primer.eta);
     float R = 0.5 * (R_i + R_o);
-    float edge_i = lf_edge_reflection(sin_i, i.w.z, lf_coat_interface.n, lf_primer.alpha);
-    float edge_o = lf_edge_reflection(sin_o, o.w.z, lf_coat_interface.n, lf_primer.alpha);
+    float edge_i = lf_edge_reflection(sin_i, i.w.w, lf_coat_interface.n, lf_primer.alpha);
+    float edge_o = lf_edge_reflection(sin_o, o.w.w, lf_coat_interface.n, lf_primer.alpha);
     vec3 q = F * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
-    float spread = (pow(max(i.spread, 1e-30), 1.34) + pow(max(o.spread, 1e-30), 1.34)) * pow(max(lf_coat.alpha, 1e-30), 1.34);
-    float total = spread + 3.0 * pow(max(lf_primer.alpha, 1e-30), 1.34);
-    total = total + 2.0 * pow(max(lf_coat.alpha, 1e-30), 1.34);
-    float width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
+    float spread = (pow(i.spread, 1.34) + pow(o.spread, 1.34)) * pow(lf_coat.alpha, 1.34);
+    float total = spread + 3.0 * pow(lf_primer.alpha, 1.34);
+    total = total + 2.0 * pow(lf_coat.alpha, 1.34);
+    float width = pow(total, 0.74626863);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
+    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
-    total = spread + 2.0 * pow(max(lf_primer.alpha, 1e-30), 1.34);
-    total = total + pow(max(lf_coat.alpha, 1e-30), 1.34);
-    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
+    total = spread + 2.0 * pow(lf_primer.alpha, 1.34);
+    total = total + pow(lf_coat.alpha, 1.34);
+    width = pow(total, 0.74626863);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
+    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
-    total = spread + pow(max(lf_primer.alpha, 1e-30), 1.34);
-    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
+    total = spread + pow(lf_primer.alpha, 1.34);
+    width = pow(total, 0.74626863);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
+    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * directional * F * lobes;
-    Crossing i2 = lf_cross(lf_primer_interface, lf_primer, i.w, wi);
-    Crossing o2 = lf_cross(lf_primer_interface, lf_primer, o.w, wo);
+    Crossing i2 = lf_cross2(lf_primer_interface, lf_primer, i.w, wi);
+    Crossing o2 = lf_cross2(lf_primer_interface, lf_primer, o.w, wo);
     float throughput2 = i2.T * o2.T / (lf_primer.eta * lf_primer.eta);
-    straight = 1.0 / max(i2.w.z, 1e-14) + 1.0 / max(o2.w.z, 1e-14);
+    straight = (i2.w.w + o2.w.w) / (i2.w.w * o2.w.w);
     added = i2.lengthening + o2.lengthening;
     vec3 throughput3 = throughput2 * throughput * directional;
-    vec3 back = R_i * lf_transmittance(lf_coat.tau, 2.0 / max(i.w.z, 1e-14));
+    vec3 back = R_i * lf_transmittance(lf_coat.tau, 2.0 / i.w.w);
     F = 1.0 - i2.T;
     vec3 R_i2 = F + i2.T * i2.T * back / max(1.0 - F * back, 1e-06);
-    back = R_o * lf_transmittance(lf_coat.tau, 2.0 / max(o.w.z, 1e-14));
+    back = R_o * lf_transmittance(lf_coat.tau, 2.0 / o.w.w);
     F = 1.0 - o2.T;
     vec3 R_o2 = F + o2.T * o2.T * back / max(1.0 - F * back, 1e-06);
     directional = lf_transmittance(lf_primer.tau, straight + 0.5 * added);
     wi = lf_steer(i2.w, 0.5 * i2.drift);
     wo = lf_steer(o2.w, 0.5 * o2.drift);
-    h = lf_half_vector(wi, wo);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_base.eta, lf_base.k);
+    h = lf_half_vector2(wi, wo);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(wi, wo), lf_base.eta, lf_base.k);
     vec3 R2 = 0.5 * (R_i2 + R_o2);
-    edge_i = lf_edge_reflection(sin_i, i2.w.z, lf_primer_interface.n, lf_base.alpha);
-    edge_o = lf_edge_reflection(sin_o, o2.w.z, lf_primer_interface.n, lf_base.alpha);
+    edge_i = lf_edge_reflection(sin_i, i2.w.w, lf_primer_interface.n, lf_base.alpha);
+    edge_o = lf_edge_reflection(sin_o, o2.w.w, lf_primer_interface.n, lf_base.alpha);
     q = F2 * (R2 + (1.0 - R2) * (0.5 * (edge_i + edge_o))) * directional;
-    spread = (pow(max(i.spread, 1e-30), 1.34) + pow(max(o.spread, 1e-30), 1.34)) * pow(max(lf_coat.alpha, 1e-30), 1.34);
-    spread = spread + (pow(max(i2.spread, 1e-30), 1.34) + pow(max(o2.spread, 1e-30), 1.34)) * pow(max(lf_primer.alpha, 1e-30), 1.34);
-    total = spread + 3.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
-    total = total + 2.0 * pow(max(lf_primer.alpha, 1e-30), 1.34);
-    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
+    spread = (pow(i.spread, 1.34) + pow(o.spread, 1.34)) * pow(lf_coat.alpha, 1.34);
+    spread = spread + (pow(i2.spread, 1.34) + pow(o2.spread, 1.34)) * pow(lf_primer.alpha, 1.34);
+    total = spread + 3.0 * pow(lf_base.alpha, 1.34);
+    total = total + 2.0 * pow(lf_primer.alpha, 1.34);
+    width = pow(total, 0.74626863);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe / max(1.0 - q, 1e-06);
-    total = spread + 2.0 * pow(max(lf_base.alpha, 1e-30), 1.34);
-    total = total + pow(max(lf_primer.alpha, 1e-30), 1.34);
-    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
+    total = spread + 2.0 * pow(lf_base.alpha, 1.34);
+    total = total + pow(lf_primer.alpha, 1.34);
+    width = pow(total, 0.74626863);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
-    total = spread + pow(max(lf_base.alpha, 1e-30), 1.34);
-    width = min(pow(max(total, 1e-30), 0.74626863), 1.5);
+    total = spread + pow(lf_base.alpha, 1.34);
+    width = pow(total, 0.74626863);
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     f2 = f2 + throughput3 * directional * F2 * lobes;
     return lit ? f2 : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -18,42 +18,42 @@ const Dielectric lf_base = Dielectric(
 );
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -61,27 +61,23 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_base.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_base.alpha);
     float projection_i = lf_ggx_projection(wi, lf_base.alpha);
     float projection_o = lf_ggx_projection(wo, lf_base.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    return vec3(lit ? F * D * V : 0.0);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float value = F * D * V;
+    return vec3(lit ? value : 0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

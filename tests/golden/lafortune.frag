@@ -37,32 +37,30 @@ vec3 lf_log1p(vec3 x) {
 }
 
 // log(Cx wi.x wo.x + Cy wi.y wo.y + Cz wi.z wo.z), which is 0 at the peak of Phong's lobe; -1e4 where there is none.
-float lf_lafortune_log_product(vec3 wi, vec3 wo, vec3 C) {
-    vec3 magnitude = abs(C);
-    vec3 apart = wi - sign(C) * wo;
-    vec3 above_one = 0.5 * ((magnitude - 1.0) * (wi * wi + wo * wo) - magnitude * (apart * apart));
-    float product = above_one.x + above_one.y + above_one.z;
+float lf_lafortune_log_product(vec4 wi, vec4 wo, vec3 C) {
+    vec4 C2 = vec4(C.x, C);
+    vec4 magnitude = abs(C2);
+    vec4 apart = wi - sign(C2) * wo;
+    vec4 above_one = 0.5 * ((magnitude - 1.0) * (wi * wi + wo * wo) - magnitude * (apart * apart));
+    float product = dot(above_one, vec4(1.0));
     bool inside = product > (-0.999999);
-    return inside ? lf_log1p(inside ? product : 0.0) : (-10000.0);
+    float value = lf_log1p(inside ? product : 0.0);
+    return inside ? value : (-10000.0);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float log_product = lf_lafortune_log_product(wi, wo, vec3(lf_base.cx, lf_base.cx, lf_base.cz));
-    return lit ? lf_base.ks * exp(min(lf_base.exponent * log_product, 80.0)) + lf_base.kd / 3.1415927 : vec3(0.0);
+    vec3 value = lf_base.ks * exp(min(lf_base.exponent * log_product, 80.0)) + lf_base.kd / 3.1415927;
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -33,36 +33,32 @@ vec3 lf_log1p(vec3 x) {
 }
 
 // 1 - cos of the angle between `wo` and the mirror direction of `wi`: half of a squared distance.
-float lf_mirror_distance(vec3 wi, vec3 wo) {
-    float x = wi.x + wo.x;
-    float y = wi.y + wo.y;
-    float z = wi.z - wo.z;
-    return 0.5 * (x * x + y * y + z * z);
+float lf_mirror_distance(vec4 wi, vec4 wo) {
+    vec3 lean = wi.xyz + wo.xyz;
+    float z = wi.w - wo.w;
+    return 0.5 * (dot(lean, lean) + z * z);
 }
 
 // cos^exponent of an angle by 1 - cos, which keeps the digits of narrow lobes; 0 from a right angle on.
 float lf_cosine_power(float one_minus, float exponent) {
     bool inside = one_minus < 0.999999;
-    return inside ? exp(exponent * lf_log1p(-(inside ? one_minus : 0.0))) : 0.0;
+    float value = exp(exponent * lf_log1p(-(inside ? one_minus : 0.0)));
+    return inside ? value : 0.0;
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float power = lf_cosine_power(lf_mirror_distance(wi, wo), lf_base.exponent);
-    return lit ? lf_base.ks * ((lf_base.exponent + 2.0) * 0.15915494 * power) + lf_base.kd / 3.1415927 : vec3(0.0);
+    vec3 value = lf_base.ks * ((lf_base.exponent + 2.0) * 0.15915494 * power) + lf_base.kd / 3.1415927;
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

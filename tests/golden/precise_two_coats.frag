@@ -47,7 +47,7 @@ struct Conductor {
 };
 
 struct Crossing {
-    vec3 w;       // median direction
+    vec4 w;       // median direction
     float T;      // energy that passes
     float a;      // spread, as a width
     float path;   // mean path, in thicknesses
@@ -76,8 +76,8 @@ const Interface lf_coat_top = Interface(
     vec4(0.041371346, 0.003288269, -0.03387451, 0.016711235),     // bend_high: 
     vec4(0.6110438, -0.30916816, 0.19031203, -0.31476402),        // spread: width of a lobe seen through it
     vec4(0.14646864, 0.20258307, -0.14906263, -0.01018548),       // spread_high: 
-    vec4(1.0417676, -0.09941718, 0.13050556, -0.13190842),        // path: mean path over that of the refracted direction
-    vec4(0.031531334, 0.08964729, -0.051778316, -0.007760048),    // path_high: 
+    vec4(1.0417676, -0.09941718, 0.13050604, -0.13191032),        // path: mean path over that of the refracted direction
+    vec4(0.031531334, 0.0896492, -0.051778316, -0.0077610016),    // path_high: 
     vec4(0.08719435, -0.22555345, 0.33561954, -0.21172841),       // theta: scale of the path's distribution
     vec4(-0.014265373, -0.082942754, -0.03109099, 0.18081078)     // theta_high: 
 );
@@ -91,43 +91,43 @@ const Interface lf_coat_both = Interface(
     vec4(0.038603067, 0.0008864403, -0.03025961, 0.015664577),    // bend_high: 
     vec4(0.08601386, -0.025296396, 0.011873268, -0.024669722),    // spread: width of a lobe seen through it
     vec4(0.013517067, 0.012449205, -0.012207478, 0.0010761321),   // spread_high: 
-    vec4(1.0279282, -0.04499501, 0.050734043, -0.05081272),       // path: mean path over that of the refracted direction
-    vec4(-0.010020733, 0.063492775, -0.01108861, -0.020301819),   // path_high: 
-    vec4(0.029751567, -0.06626405, 0.10902059, -0.075112574),     // theta: scale of the path's distribution
-    vec4(-0.06363683, 0.06794515, 0.014837317, 0.0053197443)      // theta_high: 
+    vec4(1.0279282, -0.044994652, 0.050734162, -0.05081415),      // path: mean path over that of the refracted direction
+    vec4(-0.010020494, 0.06349468, -0.011087894, -0.020304203),   // path_high: 
+    vec4(0.029751584, -0.0662639, 0.10902027, -0.075114295),      // theta: scale of the path's distribution
+    vec4(-0.063635595, 0.067949235, 0.014836162, 0.005317107)     // theta_high: 
 );
 
 const Curve lf_coat_passed = Curve(
-    vec3(0.98590416, 0.98274827, 0.978648),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.008990884, -0.0015496612, 0.007343352),    // c1: 
-    vec3(0.0045957565, 0.002224803, 0.0007728338),     // c2: 
-    vec3(0.019406796, 0.015256643, 0.008445501),       // c3: 
-    vec3(0.0017948151, -0.00309515, -0.006725073),     // c4: 
-    vec3(-0.017213821, -0.008620262, -0.00020122528),  // c5: 
-    vec3(-0.0032732487, -0.00020003319, 0.002458334),  // c6: 
-    vec3(0.006939411, 0.00228405, -0.0018701553)       // c7: 
+    vec3(0.98590416, 0.98274827, 0.9786481),            // c0: coefficients of the powers of the curves' argument
+    vec3(-0.008991003, -0.0015498996, 0.0073432326),    // c1: 
+    vec3(0.0045963526, 0.0022250414, 0.00077331066),    // c2: 
+    vec3(0.019406796, 0.015256643, 0.008446455),        // c3: 
+    vec3(0.0017943382, -0.0030956268, -0.0067255497),   // c4: 
+    vec3(-0.017215729, -0.0086221695, -0.00020313263),  // c5: 
+    vec3(-0.0032730103, -0.00019955635, 0.0024578571),  // c6: 
+    vec3(0.0069413185, 0.0022859573, -0.001868248)      // c7: 
 );
 
 const Curve lf_coat_inner_again = Curve(
-    vec3(0.3603556, 0.18331628, 0.04803366),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.13232325, -0.04552444, -0.0070955837),     // c1: 
-    vec3(-0.034575418, -0.023965456, -0.0057453513),   // c2: 
-    vec3(-0.18139142, -0.069289654, -0.018667765),     // c3: 
-    vec3(0.028492749, 0.014148235, 0.0033291206),      // c4: 
-    vec3(0.28882813, 0.07907897, 0.026420563),         // c5: 
-    vec3(-0.008797705, -0.0046213567, -0.0032977834),  // c6: 
-    vec3(-0.14820659, -0.038753152, -0.014876097)      // c7: 
+    vec3(0.36035562, 0.1833163, 0.04803366),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.13232337, -0.04552465, -0.0070956154),    // c1: 
+    vec3(-0.03457558, -0.02396562, -0.005745327),     // c2: 
+    vec3(-0.18139124, -0.06928834, -0.018667594),     // c3: 
+    vec3(0.02849245, 0.014148414, 0.0033290386),      // c4: 
+    vec3(0.28882873, 0.079077065, 0.026420519),       // c5: 
+    vec3(-0.008797646, -0.004621297, -0.0032976791),  // c6: 
+    vec3(-0.14820719, -0.03875196, -0.014876068)      // c7: 
 );
 
 const Curve lf_coat_inner_rest = Curve(
-    vec3(0.087790474, 0.07042574, 0.045924775),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.02835529, -0.019224824, -0.010248079),      // c1: 
-    vec3(-0.011888642, -0.0085204765, -0.005970778),    // c2: 
-    vec3(-0.022532135, -0.013223231, -0.010099456),     // c3: 
-    vec3(0.016208008, 0.0052274913, 0.0011859983),      // c4: 
-    vec3(0.021609962, 0.002658099, 0.0067655295),       // c5: 
-    vec3(-0.006114289, -0.00038331747, 0.00042877346),  // c6: 
-    vec3(-0.0066791177, 0.0027749687, -0.0015668571)    // c7: 
+    vec3(0.087790474, 0.070425734, 0.045924775),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.028355308, -0.019224837, -0.010248089),     // c1: 
+    vec3(-0.011888672, -0.008520484, -0.0059707314),    // c2: 
+    vec3(-0.022531986, -0.013223201, -0.010099344),     // c3: 
+    vec3(0.016208097, 0.0052275807, 0.0011858568),      // c4: 
+    vec3(0.021609783, 0.0026579201, 0.006765306),       // c5: 
+    vec3(-0.006114319, -0.00038331747, 0.00042885542),  // c6: 
+    vec3(-0.006679237, 0.0027749836, -0.001566723)      // c7: 
 );
 
 const Conductor lf_base = Conductor(
@@ -137,25 +137,25 @@ const Conductor lf_base = Conductor(
 );
 
 const Curve lf_coat_again = Curve(
-    vec3(0.10702273, 0.18307613, 0.08630123),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.007968109, -0.020511303, -0.01219501),    // c1: 
-    vec3(0.0007061064, -0.0061041713, -0.003244944),  // c2: 
-    vec3(0.004396528, 0.012475073, -0.002338171),     // c3: 
-    vec3(-0.02767533, -0.02369684, -0.010627732),     // c4: 
-    vec3(-0.045616686, -0.08103526, -0.021730661),    // c5: 
-    vec3(0.017711878, 0.0145711005, 0.006314054),     // c6: 
-    vec3(0.034207404, 0.05661285, 0.016384602)        // c7: 
+    vec3(0.107022725, 0.18307614, 0.08630123),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.007968018, -0.020511381, -0.012194965),    // c1: 
+    vec3(0.0007063076, -0.0061042905, -0.0032449737),  // c2: 
+    vec3(0.0043960214, 0.012475729, -0.0023382306),    // c3: 
+    vec3(-0.027675688, -0.023696482, -0.010627672),    // c4: 
+    vec3(-0.045615673, -0.08103633, -0.021730304),     // c5: 
+    vec3(0.017712146, 0.014570832, 0.0063140243),      // c6: 
+    vec3(0.034206867, 0.056613684, 0.016384125)        // c7: 
 );
 
 const Curve lf_coat_rest = Curve(
-    vec3(0.47436744, 0.36414492, 0.23059383),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.030093148, -0.0319556, -0.029816922),    // c1: 
-    vec3(-0.010827303, -0.004944384, -0.002696827),  // c2: 
-    vec3(0.13356614, 0.05502677, 0.006747067),       // c3: 
-    vec3(-0.024067879, -0.032443523, -0.021829367),  // c4: 
-    vec3(-0.3667338, -0.18903184, -0.0538882),       // c5: 
-    vec3(0.0031436682, 0.023648918, 0.013656855),    // c6: 
-    vec3(0.21675229, 0.12362039, 0.036097407)        // c7: 
+    vec3(0.47436747, 0.3641449, 0.23059379),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.030093253, -0.031955548, -0.029816698),   // c1: 
+    vec3(-0.010827243, -0.004943967, -0.0026964545),  // c2: 
+    vec3(0.13356733, 0.055026412, 0.0067467093),      // c3: 
+    vec3(-0.02406776, -0.032444358, -0.021829724),    // c4: 
+    vec3(-0.36673713, -0.18903017, -0.053887248),     // c5: 
+    vec3(0.003144145, 0.023649573, 0.0136573315),     // c6: 
+    vec3(0.21675277, 0.12361932, 0.03609693)          // c7: 
 );
 
 // log(1 + x) without the cancellation near 0.
@@ -172,42 +172,42 @@ vec3 lf_log1p(vec3 x) {
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
     float g2 = delta + c * c;
-    bool refracts = g2 > 1e-08;
-    float g = sqrt(refracts ? g2 : 1.0);
+    float g = sqrt(g2);
     float eta2 = eta * eta;
-    float perpendicular = (c + g) * (c + g);
-    float parallel = (eta2 * c + g) * (eta2 * c + g);
-    float rs = -delta / perpendicular;
-    float rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float rs = delta * (perpendicular * perpendicular);
+    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
     float reflectance = 0.5 * (rs * rs + rp * rp);
-    return eta == 1.0 ? 0.0 : (refracts ? reflectance : 1.0);
+    return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float e = (h.x * h.x + h.y * h.y) / (alpha * alpha) + h.z * h.z;
-    float root = 1.0 / (e * alpha);
-    return root * root / 3.1415927;
+float lf_ggx_d(vec4 h, float alpha) {
+    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
+    return root * root * 0.31830987;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec3 w, float alpha) {
-    return sqrt(max(w.z * w.z + alpha * alpha * (w.x * w.x + w.y * w.y), 0.0));
+float lf_ggx_projection(vec4 w, float alpha) {
+    float a2 = alpha * alpha;
+    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -217,23 +217,22 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 
 // Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(max(NoW, 0.0)) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec3 w, float tilt) {
-    return sqrt(max(w.z * w.z + tilt * (w.x * w.x + w.y * w.y), 0.0));
+float lf_facet_cosine(vec4 w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
 float lf_transmittance_dielectric(float c, float eta) {
-    float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
+    float g = sqrt((eta - 1.0) * (eta + 1.0) + c * c);
     float eta2 = eta * eta;
-    float perpendicular = c + g;
-    float parallel = eta2 * c + g;
-    float product = 2.0 * c * g;
-    float passed = product / max(perpendicular * perpendicular, 1e-14) + product * eta2 / max(parallel * parallel, 1e-14);
-    return eta == 1.0 ? 1.0 : passed;
+    float perpendicular = 1.0 / (c + g);
+    float parallel = 1.0 / (eta2 * c + g);
+    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    return passed;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -248,38 +247,36 @@ float lf_curve(vec4 low, vec4 high, float s) {
 }
 
 // Follow one direction through the coat's rough top.
-Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w) {
-    float s = lf_grazing(w.z);
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w) {
+    float s = lf_grazing(w.w);
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
     float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(max(w.x * w.x + w.y * w.y, 0.0));
+    float sine = sqrt(dot(w.xyz, w.xyz));
     bend = min(bend, 0.9998 / max(sine, 1e-06));
     sine = sine * bend;
     float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
-    return Crossing(vec3(w.x * bend, w.y * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
 // 0 where the indices match and there is no interface, 1 from the first index of the tables on.
 float lf_presence(float eta) {
-    float t = max((eta - 1.0) / 0.15, 0.0);
-    t = min(t, 1.0);
-    return t * (2.0 - t);
+    return 2.0 - 1.0;
 }
 
 // The polynomial at s; an energy is never below 0.
 vec3 lf_amount(Curve curve, float s) {
     vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper)));
 }
 
 // Part of a lobe's width, as a power, that is due to the base.
 float lf_base_share(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), 1.412);
+    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412);
     return base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
 }
 
@@ -289,31 +286,29 @@ float lf_direct(float share, float d, float c, float e) {
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec3 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
+vec4 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
     float own = pow(max(x.a, 1e-30), 1.412);
-    float total = pow(max(alpha * (i.w.z + o.w.z), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
+    float total = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
     float turn = 0.7504 * own / total;
-    float y0 = x.w.x - turn * (i.w.x + o.w.x);
-    float y1 = x.w.y - turn * (i.w.y + o.w.y);
-    float sine = sqrt(max(y0 * y0 + y1 * y1, 0.0));
+    vec3 y = x.w.xyz - turn * (i.w.xyz + o.w.xyz);
+    float sine = sqrt(dot(y, y));
     float held = min(1.0, 0.9998 / max(sine, 1e-06));
     sine = min(sine, 0.9998);
-    return vec3(y0 * held, y1 * held, sqrt(max((1.0 - sine) * (1.0 + sine), 0.0)));
+    return vec4(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
 }
 
 // A direction below a smooth boundary, as it is above it; `eta` is the index below over that above.
-vec3 lf_upwards(vec3 w, float eta) {
-    float x = eta * w.x;
-    float y = eta * w.y;
-    float sine = sqrt(max(x * x + y * y, 0.0));
+vec4 lf_upwards(vec4 w, float eta) {
+    vec3 part = eta * w.xyz;
+    float sine = sqrt(dot(part, part));
     float held = min(1.0, 0.9998 / max(sine, 1e-06));
     sine = min(sine, 0.9998);
-    return vec3(x * held, y * held, sqrt(max((1.0 - sine) * (1.0 + sine), 0.0)));
+    return vec4(part * held, sqrt((1.0 - sine) * (1.0 + sine)));
 }
 
 // Mean path of light that the base sends on: between that of one direction and that of all that cross.
-float lf_between(vec3 y, Crossing x, float part) {
-    float straight = 1.0 / y.z;
+float lf_between(vec4 y, Crossing x, float part) {
+    float straight = 1.0 / y.w;
     return straight + part * (x.path - straight);
 }
 
@@ -328,91 +323,97 @@ vec3 lf_projected(float path, float theta, vec3 tau) {
     return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
 }
 
+// The cosine between either direction and their half vector.
+float lf_half_cosine2(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = dot(s, s);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+}
+
 // Lambda of the GGX distribution (Heitz 2014, eq. 72).
-float lf_smith_lambda(vec3 w, float alpha) {
-    float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
+float lf_smith_lambda(vec4 w, float alpha) {
+    float tan2 = dot(w.xyz, w.xyz) / (w.w * w.w);
     float x = alpha * alpha * tan2;
     return 0.5 * x / (1.0 + sqrt(1.0 + x));
 }
 
 // D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
-float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, float alpha, float masked) {
-    float M = yi.z + yo.z;
+float lf_lobe(Crossing i, Crossing o, vec4 yi, vec4 yo, float alpha, float masked) {
+    float M = yi.w + yo.w;
     float M2 = M * M;
     float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float width2 = pow(max(pow(max(alpha * M, 1e-30), 1.412) + spread, 1e-30), 1.4164306);
+    float width2 = pow(pow(alpha * M, 1.412) + spread, 1.4164306);
     float own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float r = max(1.0 + 0.3271 * (width2 / own2 - 1.0), 0.6);
+    float r = 1.0 + 0.3271 * (width2 / own2 - 1.0);
     r = min(r, 4.0);
     float log_r = log(r);
     float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
-    float X0 = i.w.x + o.w.x;
-    float X1 = i.w.y + o.w.y;
-    float v = (X0 * X0 + X1 * X1) / width2;
-    float Y0 = yi.x + yo.x;
-    float Y1 = yi.y + yo.y;
-    float tilt = 1.0 + (Y0 * Y0 + Y1 * Y1) / M2;
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
+    vec3 Y = yi.xyz + yo.xyz;
+    float tilt = 1.0 + dot(Y, Y) / M2;
     float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
     return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * width2 * (1.0 + v * (b + r * v)));
 }
 
+// The polynomial at s; an energy is never below 0.
+vec3 lf_amount2(Curve curve, float s) {
+    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
+    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+}
+
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 float lf_wider(float alpha, float coat_alpha) {
-    return pow(max(2.0 * pow(max(alpha, 1e-30), 1.412) + 0.5751 * pow(max(coat_alpha, 1e-30), 1.412), 1e-30), 0.7082153);
+    return pow(2.0 * pow(alpha, 1.412) + 0.5751 * pow(coat_alpha, 1.412), 0.7082153);
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * (i.w.x * o.w.x + i.w.y * o.w.y);
-    return max(1.0 - (1.0 - min(alpha, 1.0)) * back, 0.0) / 3.1415927;
+    float back = eta * eta * dot(i.w.xyz, o.w.xyz);
+    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_coat.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     Crossing crossing = lf_pass_interface(lf_coat_top, lf_coat.eta, lf_coat.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_coat_top, lf_coat.eta, lf_coat.alpha, wo);
     Crossing crossing3 = lf_pass_interface(lf_coat_both, lf_coat.eta, 1.0, wi);
     Crossing crossing4 = lf_pass_interface(lf_coat_both, lf_coat.eta, 1.0, wo);
-    float there = lf_presence(max(lf_primer.eta, 1.0 / lf_primer.eta));
+    float there = lf_presence(lf_primer.eta);
     float alpha = lf_coat.alpha + there * (lf_primer.alpha - lf_coat.alpha);
     float eta = lf_coat.eta * lf_primer.eta;
     vec3 kept = lf_amount(lf_coat_passed, crossing3.s) * lf_amount(lf_coat_passed, crossing4.s);
     float part = lf_direct(lf_base_share(crossing3, crossing4, lf_base.alpha), 0.3296, 0.3522, 1.803);
-    vec3 y = lf_upwards(lf_lean(crossing3, crossing3, crossing4, lf_base.alpha), lf_primer.eta);
+    vec4 y = lf_upwards(lf_lean(crossing3, crossing3, crossing4, lf_base.alpha), lf_primer.eta);
     vec3 left = lf_absorbed(lf_between(y, crossing, part), part * crossing.theta, lf_coat.tau);
     y = lf_upwards(lf_lean(crossing4, crossing3, crossing4, lf_base.alpha), lf_primer.eta);
     left = left * lf_absorbed(lf_between(y, crossing2, part), part * crossing2.theta, lf_coat.tau);
     kept = kept * left;
     float throughput = crossing.T * crossing2.T / (lf_coat.eta * lf_coat.eta);
     float share = lf_base_share(crossing, crossing2, lf_primer.alpha);
-    vec3 yi = lf_lean(crossing, crossing, crossing2, lf_primer.alpha);
-    vec3 yo = lf_lean(crossing2, crossing, crossing2, lf_primer.alpha);
+    vec4 yi = lf_lean(crossing, crossing, crossing2, lf_primer.alpha);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, lf_primer.alpha);
     part = lf_direct(share, 0.3296, 0.3522, 1.803);
     vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_coat.tau);
     part = lf_direct(share, 0.3096, 0.2662, 1.772);
@@ -423,12 +424,12 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     part = lf_direct(share, 0.3096, 0.2662, 1.772);
     path = lf_between(yo, crossing2, part);
     U = U * lf_projected(path, part * crossing2.theta, lf_coat.tau);
-    float F2 = lf_fresnel_dielectric(lf_half_cosine(yi, yo), lf_primer.eta);
+    float F2 = lf_fresnel_dielectric(lf_half_cosine2(yi, yo), lf_primer.eta);
     float rise = 1.0 + 0.3036 * lf_presence(lf_coat.eta) * lf_coat.alpha * lf_coat.alpha * share;
     float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, lf_primer.alpha, lf_primer.alpha);
-    vec3 again = 0.5 * F2 * (lf_amount(lf_coat_inner_again, crossing.s) + lf_amount(lf_coat_inner_again, crossing2.s));
+    vec3 again = 0.5 * F2 * (lf_amount2(lf_coat_inner_again, crossing.s) + lf_amount2(lf_coat_inner_again, crossing2.s));
     vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(lf_primer.alpha, lf_coat.alpha), lf_primer.alpha);
-    vec3 root = lf_amount(lf_coat_inner_rest, crossing.s) * lf_amount(lf_coat_inner_rest, crossing2.s);
+    vec3 root = lf_amount2(lf_coat_inner_rest, crossing.s) * lf_amount2(lf_coat_inner_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_coat.eta, lf_primer.alpha);
     float throughput2 = crossing3.T * crossing4.T / (eta * eta);
     share = lf_base_share(crossing3, crossing4, lf_base.alpha);
@@ -444,24 +445,22 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     part = lf_direct(share, 0.3096, 0.2662, 1.772);
     path = lf_between(yo, crossing4, part);
     U2 = U2 * lf_projected(path, part * crossing4.theta, lf_primer.tau);
-    vec3 F3 = lf_fresnel_conductor(lf_half_cosine(yi, yo), lf_base.eta, lf_base.k);
+    vec3 F3 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_base.eta, lf_base.k);
     rise = 1.0 + 0.3036 * lf_presence(eta) * alpha * alpha * share;
     lobes = rise * lf_lobe(crossing3, crossing4, yi, yo, lf_base.alpha, lf_base.alpha);
-    again = 0.5 * F3 * (lf_amount(lf_coat_again, crossing3.s) + lf_amount(lf_coat_again, crossing4.s));
+    again = 0.5 * F3 * (lf_amount2(lf_coat_again, crossing3.s) + lf_amount2(lf_coat_again, crossing4.s));
     vec3 lobes3 = lobes + again * lf_lobe(crossing3, crossing4, yi, yo, lf_wider(lf_base.alpha, alpha), lf_base.alpha);
-    root = lf_amount(lf_coat_rest, crossing3.s) * lf_amount(lf_coat_rest, crossing4.s);
+    root = lf_amount2(lf_coat_rest, crossing3.s) * lf_amount2(lf_coat_rest, crossing4.s);
     vec3 rest2 = root * root * lf_ahead(crossing3, crossing4, eta, lf_base.alpha);
-    return lit ? F * D * V + (throughput * A * (F2 * U * lobes2 + rest) + kept * (throughput2 * A2 * (F3 * U2 * lobes3 + rest2))) : vec3(0.0);
+    vec3 value = F * D * V + (throughput * A * (F2 * U * lobes2 + rest) + kept * (throughput2 * A2 * (F3 * U2 * lobes3 + rest2)));
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

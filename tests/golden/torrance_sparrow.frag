@@ -37,68 +37,62 @@ float lf_atan2(float y, float x) {
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s / sqrt(max(dot(s, s), 1e-20));
+vec4 lf_half_vector(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(max(dot(s, s), 1e-20));
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return min(0.5 * sqrt(max(dot(s, s), 0.0)), 1.0);
+float lf_half_cosine(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = max(dot(s, s), 1e-20);
+    return min(0.5 * s2 * inversesqrt(s2), 1.0);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
-    float s2 = (1.0 - c) * (1.0 + c);
+    float s2 = 1.0 - c2;
     vec3 p = (eta - k) * (eta + k) - s2;
     vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
     vec3 twice_ac = 2.0 * a * c;
-    vec3 rs = (q + c2 - twice_ac) / max(q + c2 + twice_ac, 1e-12);
-    float s4 = s2 * s2;
-    vec3 even = q * c2 + s4;
+    vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    vec3 rp = rs * (even - odd) / max(even + odd, 1e-12);
-    return 0.5 * (rs + rp);
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10).
-float lf_v_cavity(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    float NoH_over_c = 2.0 * s.z / max(dot(s, s), 1e-20);
-    return min(0.25 / max(wi.z * wo.z, 1e-14), 0.5 * NoH_over_c / max(max(wi.z, wo.z), 1e-14));
+float lf_v_cavity(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float NoH_over_c = 2.0 * s.w / max(dot(s, s), 1e-20);
+    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(max(wi.w, wo.w), 1e-14));
 }
 
 // exp(-(kappa delta)^2), delta the angle between facet and surface (Torrance and Sparrow 1967).
-float lf_torrance_sparrow_d(vec3 h, float kappa) {
-    float delta = lf_atan2(sqrt(max(h.x * h.x + h.y * h.y, 0.0)), h.z);
+float lf_torrance_sparrow_d(vec4 h, float kappa) {
+    float delta = lf_atan2(sqrt(dot(h.xyz, h.xyz)), h.w);
     float slope = kappa * delta;
     return exp(-(slope * slope));
 }
 
-// BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
-vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = wi.z > 0.0 && wo.z > 0.0;
-    wi = lit ? wi : vec3(0.0, 0.0, 1.0);
-    wo = lit ? wo : vec3(0.0, 0.0, 1.0);
-    vec3 h = lf_half_vector(wi, wo);
+// BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
+vec3 lf_evaluate(vec4 wi, vec4 wo) {
+    bool lit = min(wi.w, wo.w) > 0.0;
+    vec4 h = lf_half_vector(wi, wo);
     float c = lf_half_cosine(wi, wo);
     float V = lf_v_cavity(wi, wo);
-    return lit ? lf_base.ks * lf_fresnel_conductor(c, lf_base.eta, lf_base.k) * (lf_torrance_sparrow_d(h, lf_base.kappa) * V) + lf_base.kd / 3.1415927 : vec3(0.0);
+    vec3 value = lf_base.ks * lf_fresnel_conductor(c, lf_base.eta, lf_base.k) * (lf_torrance_sparrow_d(h, lf_base.kappa) * V) + lf_base.kd / 3.1415927;
+    return lit ? value : vec3(0.0);
 }
 
-// BRDF [1/sr] in any frame.
+// BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
-    // A tangent frame from the normal alone (Duff et al. 2017): an isotropic surface does not ask which.
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    float b = n.x * n.y * a;
-    mat3 surface = transpose(mat3(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n));
-    return lf_evaluate(surface * l, surface * v);
+    float NoL = dot(n, l);
+    float NoV = dot(n, v);
+    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

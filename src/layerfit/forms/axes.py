@@ -8,7 +8,7 @@ the slopes (energy, bend, path) adds up from both axes: it is mixed from isotrop
 import jax
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_sqrt
+from .._chunk import chunk, dot, safe_sqrt
 from .._types import Scalar, Vec2, Vec3
 from ..optics.microfacet import Width
 from .curves import Interface, Nodes, bake
@@ -38,14 +38,9 @@ def area(squares: Widths) -> Scalar:
     return safe_sqrt(squares[0] * squares[1]) if jnp.ndim(squares) else squares
 
 
-def stretched(x: Scalar, y: Scalar, squares: Widths) -> Scalar:
-    """Squared distance in widths, from squares of the widths."""
-    return x * x / squares[0] + y * y / squares[1] if jnp.ndim(squares) else (x * x + y * y) / squares
-
-
-def along(values: Widths, axis: int) -> Scalar:
-    """The value of one axis."""
-    return values[axis] if jnp.ndim(values) else values
+def stretched(x: jax.Array, squares: Widths) -> Scalar:
+    """Squared distance in widths along the surface, from squares of the widths."""
+    return x[0] * x[0] / squares[0] + x[1] * x[1] / squares[1] if jnp.ndim(squares) else dot(x, x) / squares
 
 
 def tops(eta: Scalar, width: Width, kind: Kind) -> tuple[Interface, Interface | None, Nodes]:

@@ -16,8 +16,9 @@ from typing import Any
 import jax.numpy as jnp
 
 from .._chunk import chunk, safe_divide, safe_power, safe_sqrt, struct, where
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Direction, Scalar
 from ..layers import Coat
+from ..optics.directions import above, both_above, sine2
 from ..optics.interface import steer
 from ..optics.microfacet import Distribution, Width, half_cosine, half_vector
 from ..surfaces.base import Lobe
@@ -101,12 +102,10 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Corrected) -> Prepared:
     return Prepared(tuple(relative), tuple(interfaces), base, returned, lobes, trapped, light)
 
 
-def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Corrected) -> Colour:
+def evaluate(prepared: Prepared, wi: Direction, wo: Direction, options: Corrected) -> Colour:
     """BRDF [1/sr] of unit directions above the surface; 0 where either is below it."""
-    lit = (wi[2] > 0.0) & (wo[2] > 0.0)
-    up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = where(lit, wi, up)
-    wo = where(lit, wo, up)
+    lit = both_above(wi, wo)
+    wi, wo = above(lit, wi), above(lit, wo)
     f = prepared.coats[0].evaluate(wi, wo)
     below = _enter(None, wi, wo, prepared, options)
     for coat in prepared.coats[1:]:
@@ -152,23 +151,23 @@ class _Below:
     """Facet width, spreads of the two directions and kind, of each interface passed."""
 
 
-def _enter(above: _Below | None, wi: Vec3, wo: Vec3, prepared: Prepared, options: Corrected) -> _Below:
+def _enter(above: _Below | None, wi: Direction, wo: Direction, prepared: Prepared, options: Corrected) -> _Below:
     """Pass the next interface; wi and wo in air."""
     depth = above.depth if above else 0
     coat, interface = prepared.coats[depth], prepared.interfaces[depth]
     i = cross(interface, coat, above.i.w if above else wi, wi)
     o = cross(interface, coat, above.o.w if above else wo, wo)
     throughput = i.T * o.T / (coat.eta * coat.eta)
-    straight = safe_divide(1.0, i.w[2]) + safe_divide(1.0, o.w[2])
+    straight = safe_divide(i.w[-1] + o.w[-1], i.w[-1] * o.w[-1])
     added = i.lengthening + o.lengthening if options.lengthen else 0.0
     if above:
         sin_i, sin_o, spreads = above.sin_i, above.sin_o, above.spreads
         throughput = throughput * above.throughput * above.directional
-        R_i = _reflected_above(i.T, above.R_i, above.tau, above.i.w[2])
-        R_o = _reflected_above(o.T, above.R_o, above.tau, above.o.w[2])
+        R_i = _reflected_above(i.T, above.R_i, above.tau, above.i.w[-1])
+        R_o = _reflected_above(o.T, above.R_o, above.tau, above.o.w[-1])
     else:
-        sin_i = safe_sqrt(wi[0] * wi[0] + wi[1] * wi[1])
-        sin_o = safe_sqrt(wo[0] * wo[0] + wo[1] * wo[1])
+        sin_i = safe_sqrt(sine2(wi))
+        sin_o = safe_sqrt(sine2(wo))
         spreads = ()
         R_i, R_o = 1.0 - i.T, 1.0 - o.T
     return _Below(
@@ -212,7 +211,7 @@ def _bounced(target: Lobe, below: _Below, options: Corrected) -> Colour:
     return below.throughput * below.directional * F * lobes
 
 
-def _shape(target: Lobe, wi: Vec3, wo: Vec3, h: Vec3, order: int, below: _Below, spread: Width | None) -> Any:
+def _shape(target: Lobe, wi: Direction, wo: Direction, h: Direction, order: int, below: _Below, spread: Width | None) -> Any:
     """The lobe of light that met `target` `order` times; `spread` is what the interfaces passed add to its width."""
     if spread is None:
         return target.shape(wi, wo, h, target.width)
@@ -230,7 +229,7 @@ def _width_power(target: Lobe, below: _Below) -> float:
 
 def _by_lobes(lobes: Colour, R: Colour, crossing: Crossing, tau: Colour | None) -> Colour:
     """Gain of a diffuse part by light of one direction that the lobes send to the coat first, and the coat back."""
-    return 1.0 / jnp.maximum(1.0 - lobes * R * remains(tau, safe_divide(2.0, crossing.w[2])), 1e-6)
+    return 1.0 / jnp.maximum(1.0 - lobes * R * remains(tau, safe_divide(2.0, crossing.w[-1])), 1e-6)
 
 
 def _returned(target: Lobe, below: _Below, options: Corrected) -> Colour:
@@ -239,8 +238,8 @@ def _returned(target: Lobe, below: _Below, options: Corrected) -> Colour:
     if not options.edge:
         return R
     alpha = mean_width(target.width)
-    edge_i = edge_reflection(below.sin_i, below.i.w[2], below.n, alpha)
-    edge_o = edge_reflection(below.sin_o, below.o.w[2], below.n, alpha)
+    edge_i = edge_reflection(below.sin_i, below.i.w[-1], below.n, alpha)
+    edge_o = edge_reflection(below.sin_o, below.o.w[-1], below.n, alpha)
     return R + (1.0 - R) * (0.5 * (edge_i + edge_o))
 
 
@@ -334,7 +333,7 @@ def _scattered(prepared: Prepared, below: _Below, options: Corrected) -> Colour:
     """Light that the innermost coat scatters."""
 
     def way(crossing: Crossing, R: Colour) -> haze.Way:
-        path = safe_divide(1.0, crossing.w[2])
+        path = safe_divide(1.0, crossing.w[-1])
         if options.lengthen:
             path = path + crossing.lengthening
         return haze.Way(crossing.w, path, R)

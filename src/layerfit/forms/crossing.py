@@ -6,7 +6,7 @@ Fits to the walk, for light that comes from the rarer side; into a rarer medium 
 import jax.numpy as jnp
 
 from .._chunk import chunk, member, safe_sqrt, struct, where
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Direction, Scalar
 from ..layers import Coat
 from ..optics.interface import (
     drift,
@@ -61,7 +61,7 @@ def interface_of(coat: Coat, n: Scalar, rough: bool) -> Interface:
 class Crossing:
     """One direction on its way through one rough interface."""
 
-    w: Vec3 = member("direction in the medium below")
+    w: Direction = member("direction in the medium below")
     T: Colour = member("energy that passes")
     spread: Scalar = member("width of the refracted directions over that of the facets")
     lengthening: Scalar = member("path beyond that of the refracted direction, in thicknesses")
@@ -69,11 +69,11 @@ class Crossing:
 
 
 @chunk
-def cross(interface: Interface, coat: Coat, w: Vec3, air: Vec3) -> Crossing:
+def cross(interface: Interface, coat: Coat, w: Direction, air: Direction) -> Crossing:
     """Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them."""
     c = facet_cosine(w, interface.tilt)
     # Out of a denser medium the fits do not hold for the energy: there the interface passes light as a smooth one.
-    c_energy = where(coat.eta >= 1.0, c, w[2])
+    c_energy = where(coat.eta >= 1.0, c, w[-1])
     T = with_second_facet(coat.transmittance(c_energy), interface.gain)
     grazing = drift(w, interface.drift, interface.alpha)
     # From air at once, not from layer to layer: going back to index 1 gives the same direction to the last bit.

@@ -99,12 +99,12 @@ def _passed_up(coats: list[Coat], interfaces: list[Interface], p2: Scalar) -> Co
     for depth, (coat, interface) in enumerate(zip(coats, interfaces, strict=True)):
         cosine2 = 1.0 - p2 / (n_above * n_above)
         w = jnp.stack([safe_sqrt(p2) / n_above, jnp.zeros_like(p2), safe_sqrt(cosine2)])
-        c = where(coat.eta >= 1.0, facet_cosine(w, interface.tilt), w[2])
+        c = where(coat.eta >= 1.0, facet_cosine(w, interface.tilt), w[-1])
         T = where(cosine2 > 0.0, with_second_facet(coat.transmittance(c), interface.gain), 0.0)
         if depth == 0:
             S = T
         else:
-            back = (1.0 - S) * remains(coats[depth - 1].extinction, safe_divide(2.0, w[2]))
+            back = (1.0 - S) * remains(coats[depth - 1].extinction, safe_divide(2.0, w[-1]))
             S = T * (1.0 - back) / jnp.maximum(1.0 - (1.0 - T) * back, 1e-6)
         n_above = interface.n
     return S

@@ -8,11 +8,10 @@ surface does below its coat (no 1 / eta^2, one bounce, a smooth way through a ro
 import dataclasses
 from typing import Any, Literal
 
-import jax.numpy as jnp
-
 from .._chunk import safe_divide, struct, where
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Direction, Scalar
 from ..layers import Coat
+from ..optics.directions import above, both_above
 from ..optics.medium import cosine_below, refract_about_facet, refract_about_normal, transmittance
 from ..optics.microfacet import half_cosine, half_vector
 
@@ -57,21 +56,19 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Faithful) -> Prepared:
     return Prepared(tuple(relative), base.below(n))
 
 
-def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Faithful) -> Colour:
+def evaluate(prepared: Prepared, wi: Direction, wo: Direction, options: Faithful) -> Colour:
     """BRDF [1/sr] of unit directions above the surface."""
     return _evaluate(prepared.coats, prepared.base, wi, wo, None, options)
 
 
-Half = tuple[Vec3, Scalar] | None
+Half = tuple[Direction, Scalar] | None
 """Half vector of two directions, and its cosine to them, where they are known."""
 
 
-def _evaluate(coats: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, half: Half, options: Faithful) -> Colour:
+def _evaluate(coats: tuple[Coat, ...], base: Any, wi: Direction, wo: Direction, half: Half, options: Faithful) -> Colour:
     # Below the surface, or lost by total internal reflection above: no light. The dummy keeps derivatives finite.
-    lit = (wi[2] > 0.0) & (wo[2] > 0.0)
-    up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = where(lit, wi, up)
-    wo = where(lit, wo, up)
+    lit = both_above(wi, wo)
+    wi, wo = above(lit, wi), above(lit, wo)
     if coats:
         f = _coat_over(coats[0], coats[1:], base, wi, wo, half, options)
     else:
@@ -79,7 +76,9 @@ def _evaluate(coats: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, half: Half
     return where(lit, f, 0.0)
 
 
-def _coat_over(coat: Coat, below: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec3, half: Half, options: Faithful) -> Colour:
+def _coat_over(
+    coat: Coat, below: tuple[Coat, ...], base: Any, wi: Direction, wo: Direction, half: Half, options: Faithful
+) -> Colour:
     if half is None:
         h = half_vector(wi, wo)
         c = half_cosine(wi, wo)
@@ -89,7 +88,7 @@ def _coat_over(coat: Coat, below: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec
     D = coat.density(h)
     V = coat.visibility(wi, wo)
     top = F * D * V
-    G = 4.0 * V * wi[2] * wo[2]
+    G = 4.0 * V * wi[-1] * wo[-1]
     half = None
     if options.refract_at == "h":
         # Bent about it, both keep their half vector: all layers have the same.
@@ -104,13 +103,13 @@ def _coat_over(coat: Coat, below: tuple[Coat, ...], base: Any, wi: Vec3, wo: Vec
         T12 = coat.transmittance(c)
         T21 = T12
     else:
-        T12 = coat.transmittance(wi[2])
-        T21 = coat.transmittance(wo[2])
-    t = (1.0 - G) + T21 * G if options.masked else T21
+        T12 = coat.transmittance(wi[-1])
+        T21 = coat.transmittance(wo[-1])
+    t = 1.0 - G * (1.0 - T21) if options.masked else T21
     rest = T12 * t * _evaluate(below, base, wi_below, wo_below, half, options)
     if coat.tau is not None:
         at_h = half_cosine(wi_below, wo_below) if half is None else half[1]
-        cos_i, cos_o = (at_h, at_h) if options.absorb_at == "h" else (wi_below[2], wo_below[2])
-        path = safe_divide(1.0, cos_i) + safe_divide(1.0, cos_o)
+        cos_i, cos_o = (at_h, at_h) if options.absorb_at == "h" else (wi_below[-1], wo_below[-1])
+        path = safe_divide(cos_i + cos_o, cos_i * cos_o)
         rest = rest * transmittance(coat.tau, path)
     return top + rest

@@ -20,8 +20,9 @@ from typing import Any
 import jax.numpy as jnp
 
 from .._chunk import chunk, dot, member, safe_power, safe_sqrt, struct, where
-from .._types import Colour, Number, Scalar, Vec3
+from .._types import Colour, Direction, Number, Scalar
 from ..layers import Coat
+from ..optics.directions import along, direction
 from ..optics.microfacet import Width, half_cosine
 from ..optics.scattering import henyey_greenstein, mean_transmittance, once_back, once_through
 from ..surfaces.base import Lobe, Surface
@@ -180,7 +181,7 @@ def _exchanges(albedos: Sequence[Colour], arriving: Sequence[Sequence[Colour]]) 
 class Way:
     """One direction within the medium: a plain record, so that nothing of it is printed."""
 
-    w: Vec3
+    w: Direction
     path: Scalar
     """Length of the way through the medium, in thicknesses."""
     R: Colour
@@ -206,8 +207,8 @@ def scattered(haze: Haze | None, coat: Coat, base: Surface, i: Way, o: Way, spre
     for lobe in base.lobes:
         f = f + _by_way_of(lobe, haze, coat, i, o, spread)
     if base.lobes:
-        beam_i = mirrored(beam_i, mirror(base, i.w[2]), i.R)
-        beam_o = mirrored(beam_o, mirror(base, o.w[2]), o.R)
+        beam_i = mirrored(beam_i, mirror(base, i.w[-1]), i.R)
+        beam_o = mirrored(beam_o, mirror(base, o.w[-1]), o.R)
     if base.diffuse is not None:
         f = f + beam_i.base * beam_o.base * haze.returned * base.diffuse.evaluate(i.w, o.w)
     return f + exchanged(haze, beam_i, beam_o)
@@ -216,7 +217,7 @@ def scattered(haze: Haze | None, coat: Coat, base: Surface, i: Way, o: Way, spre
 def _by_way_of(lobe: Lobe, haze: Haze, coat: Coat, i: Way, o: Way, spread: Scalar) -> Colour:
     """Light that met a lobe of the base, and was scattered once before or after it, or forwards more often."""
     g, tau_s, reduced = coat.g, coat.tau_s, haze.reduced
-    F_i, F_o = reflected(lobe, i.w[2]), reflected(lobe, o.w[2])
+    F_i, F_o = reflected(lobe, i.w[-1]), reflected(lobe, o.w[-1])
     up_i, up_o = F_i * jnp.exp(-reduced * i.path), F_o * jnp.exp(-reduced * o.path)
     even = EVENLY if g is None else EVENLY * (1.0 - jnp.maximum(g, 0.0))
     f = once_by_mirror(even, even, tau_s, reduced, i.path, o.path, up_i, up_o)
@@ -224,7 +225,7 @@ def _by_way_of(lobe: Lobe, haze: Haze, coat: Coat, i: Way, o: Way, spread: Scala
         return f
     tau = coat.extinction
     wider = spread + width_power(lobe.width)
-    on = 1.0 - dot(jnp.stack([-i.w[0], -i.w[1], i.w[2]]), o.w)
+    on = 1.0 - dot(direction(-along(i.w), i.w[-1]), o.w)
     phase_on = widened_phase(on, g, wider) - even
     phase_back = widened_phase(1.0 + dot(i.w, o.w), g, wider + width_power(lobe.width)) - even
     up_i, up_o = F_i * jnp.exp(-tau * i.path), F_o * jnp.exp(-tau * o.path)

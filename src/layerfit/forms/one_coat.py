@@ -14,12 +14,13 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, clip, member, safe_power, safe_sqrt, struct
-from .._types import Colour, Number, Scalar, Vec3
+from .._chunk import chunk, clip, dot, member, safe_power, safe_sqrt, struct
+from .._types import Colour, Direction, Number, Scalar
 from ..layers import Coat
+from ..optics.directions import along, direction, sine2
 from ..optics.interface import facet_cosine, rough_transmittance
 from ..optics.microfacet import Width, ggx_lambda, half_cosine
-from .axes import Widths, along, area, even_width, over_axes, stretched, tops, towards, widths
+from .axes import Widths, area, even_width, over_axes, stretched, tops, towards, widths
 from .bounces import Curve, amount, bounces, wider
 from .curves import Interface, P, absorbed, curve, diffuse_return, grazing, presence
 from .tables import Kind
@@ -62,7 +63,7 @@ class Prepared:
 class Crossing:
     """One direction below the interface."""
 
-    w: Vec3 = member("median direction")
+    w: Direction = member("median direction")
     T: Scalar = member("energy that passes")
     a: Widths = member("spread, as a width")
     path: Scalar = member("mean path, in thicknesses")
@@ -92,13 +93,13 @@ def crossed(coat: Coat) -> Width:
     return BECKMANN * coat.width
 
 
-def cross(prepared: Prepared, w: Vec3) -> Crossing:
+def cross(prepared: Prepared, w: Direction) -> Crossing:
     """Follow one direction into the coat."""
     interface = towards(prepared.interface, prepared.across, w)
     return pass_interface(interface, prepared.coat.eta, widths(crossed(prepared.coat)), w)
 
 
-def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3) -> Colour:
+def evaluate(prepared: Prepared, wi: Direction, wo: Direction) -> Colour:
     """BRDF [1/sr] of unit directions above the surface."""
     i, o = (cross(prepared, w) for w in (wi, wo))
     return prepared.coat.evaluate(wi, wo) + below(i, o, prepared)
@@ -141,25 +142,25 @@ def below(i: Crossing, o: Crossing, prepared: Prepared) -> Colour:
 @chunk
 def ahead(i: Crossing, o: Crossing, eta: Scalar, alpha: Scalar) -> Scalar:
     """What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base."""
-    back = eta * eta * (i.w[0] * o.w[0] + i.w[1] * o.w[1])
+    back = eta * eta * dot(along(i.w), along(o.w))
     return jnp.maximum(1.0 - (1.0 - jnp.minimum(alpha, 1.0)) * back, 0.0) / jnp.pi
 
 
 @chunk
-def pass_interface(interface: Interface, eta: Scalar, alpha: Widths, w: Vec3) -> Crossing:
+def pass_interface(interface: Interface, eta: Scalar, alpha: Widths, w: Direction) -> Crossing:
     """Follow one direction through the coat's rough top."""
-    s = grazing(w[2])
+    s = grazing(w[-1])
     T = rough_transmittance(facet_cosine(w, interface.tilt), eta, interface.gain)
     T = clip(T + curve(interface.passed, interface.passed_high, s), 0.0, 1.0)
     bend = curve(interface.bend, interface.bend_high, s) / eta
-    sine = safe_sqrt(w[0] * w[0] + w[1] * w[1])
+    sine = safe_sqrt(sine2(w))
     bend = jnp.minimum(bend, 0.9998 / jnp.maximum(sine, 1e-6))
     sine = sine * bend
     z = safe_sqrt((1.0 - sine) * (1.0 + sine))
     a = jnp.maximum(curve(interface.spread, interface.spread_high, s), 0.0) * alpha
     path = jnp.maximum(curve(interface.path, interface.path_high, s), 1.0) / z
     theta = jnp.maximum(curve(interface.theta, interface.theta_high, s), 1e-4)
-    return Crossing(jnp.stack([w[0] * bend, w[1] * bend, z]), T, a, path, theta, s)
+    return Crossing(direction(along(w) * bend, z), T, a, path, theta, s)
 
 
 @chunk
@@ -169,31 +170,30 @@ def projected(path: Scalar, theta: Scalar, tau: Colour) -> Colour:
 
 
 @chunk
-def between(y: Vec3, x: Crossing, part: Scalar) -> Scalar:
+def between(y: Direction, x: Crossing, part: Scalar) -> Scalar:
     """Mean path of light that the base sends on: between that of one direction and that of all that cross."""
-    straight = 1.0 / y[2]
+    straight = 1.0 / y[-1]
     return straight + part * (x.path - straight)
 
 
 @chunk
 def base_share(i: Crossing, o: Crossing, alpha: Widths) -> Scalar:
     """Part of a lobe's width, as a power, that is due to the base."""
-    base = safe_power(alpha * (i.w[2] + o.w[2]), P)
+    base = safe_power(alpha * (i.w[-1] + o.w[-1]), P)
     return over_axes(base / (base + safe_power(i.a, P) + safe_power(o.a, P)))
 
 
 @chunk
-def lean(x: Crossing, i: Crossing, o: Crossing, alpha: Widths) -> Vec3:
+def lean(x: Crossing, i: Crossing, o: Crossing, alpha: Widths) -> Direction:
     """The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone."""
     own = safe_power(x.a, P)
-    total = safe_power(alpha * (i.w[2] + o.w[2]), P) + safe_power(i.a, P) + safe_power(o.a, P)
+    total = safe_power(alpha * (i.w[-1] + o.w[-1]), P) + safe_power(i.a, P) + safe_power(o.a, P)
     turn = CONDENSE * own / total
-    y0 = x.w[0] - along(turn, 0) * (i.w[0] + o.w[0])
-    y1 = x.w[1] - along(turn, 1) * (i.w[1] + o.w[1])
-    sine = safe_sqrt(y0 * y0 + y1 * y1)
+    y = along(x.w) - turn * (along(i.w) + along(o.w))
+    sine = safe_sqrt(dot(y, y))
     held = jnp.minimum(1.0, 0.9998 / jnp.maximum(sine, 1e-6))
     sine = jnp.minimum(sine, 0.9998)
-    return jnp.stack([y0 * held, y1 * held, safe_sqrt((1.0 - sine) * (1.0 + sine))])
+    return direction(y * held, safe_sqrt((1.0 - sine) * (1.0 + sine)))
 
 
 @chunk
@@ -203,12 +203,12 @@ def direct(share: Scalar, d: Number, c: Number, e: Number) -> Scalar:
 
 
 @chunk
-def lobe(i: Crossing, o: Crossing, yi: Vec3, yo: Vec3, alpha: Widths, masked: Widths) -> Scalar:
+def lobe(i: Crossing, o: Crossing, yi: Direction, yo: Direction, alpha: Widths, masked: Widths) -> Scalar:
     """D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
 
     Without an interface, and times the projected areas, it is D V of GGX.
     """
-    M = yi[2] + yo[2]
+    M = yi[-1] + yo[-1]
     M2 = M * M
     spread = safe_power(i.a, P) + safe_power(o.a, P)
     width2 = safe_power(safe_power(alpha * M, P) + spread, 2.0 / P)
@@ -217,20 +217,19 @@ def lobe(i: Crossing, o: Crossing, yi: Vec3, yo: Vec3, alpha: Widths, masked: Wi
     r = clip(1.0 + RATIO * (size / area(own2) - 1.0), 0.6, 4.0)
     log_r = jnp.log(r)
     b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r))
-    X0, X1 = i.w[0] + o.w[0], i.w[1] + o.w[1]
-    v = stretched(X0, X1, width2)
-    Y0, Y1 = yi[0] + yo[0], yi[1] + yo[1]
-    tilt = 1.0 + (Y0 * Y0 + Y1 * Y1) / M2
+    v = stretched(along(i.w) + along(o.w), width2)
+    Y = along(yi) + along(yo)
+    tilt = 1.0 + dot(Y, Y) / M2
     G = 1.0 / (1.0 + smith_lambda(yi, masked) + smith_lambda(yo, masked))
     return M2 * tilt * tilt * (0.25 * G) / (jnp.pi * size * (1.0 + v * (b + r * v)))
 
 
 @chunk
-def smith_lambda(w: Vec3, alpha: Widths) -> Scalar:
+def smith_lambda(w: Direction, alpha: Widths) -> Scalar:
     """Lambda of the GGX distribution (Heitz 2014, eq. 72)."""
     if jnp.ndim(alpha):
         x, y = alpha[0] * w[0], alpha[1] * w[1]
-        return ggx_lambda((x * x + y * y) / (w[2] * w[2]))
-    tan2 = (w[0] * w[0] + w[1] * w[1]) / (w[2] * w[2])
+        return ggx_lambda((x * x + y * y) / (w[-1] * w[-1]))
+    tan2 = sine2(w) / (w[-1] * w[-1])
     x = alpha * alpha * tan2
     return ggx_lambda(x)

@@ -14,9 +14,10 @@ import jax.numpy as jnp
 
 from .._chunk import chunk, dot, member, struct, where
 from .._place import Place
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Direction, Scalar
 from ..errors import InputError
 from ..layers import Patina
+from ..optics.directions import above, both_above
 from ..optics.fresnel import transmittance_dielectric
 from ..optics.growth import onset, tarnish_thickness
 from ..optics.medium import refract_about_normal
@@ -130,12 +131,10 @@ def prepare(layers: tuple[Any, ...], base: Any, form: Any) -> Prepared:
     return Prepared(film=film, bare=base.below(1.0), growth=growth_of(layer), crust=crust, spot=None)
 
 
-def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
+def evaluate(prepared: Prepared, wi: Direction, wo: Direction, form: Any) -> Colour:
     """BRDF [1/sr] of unit directions above the surface; 0 where either is below it. `form` is that of the film."""
-    lit = (wi[2] > 0.0) & (wo[2] > 0.0)
-    up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = where(lit, wi, up)
-    wo = where(lit, wo, up)
+    lit = both_above(wi, wo)
+    wi, wo = above(lit, wi), above(lit, wo)
     spot = prepared.spot or mean_spot(prepared)
     film = _as_thick(prepared.film, spot.thickness, form)
     patina = FORMS[type(form)].evaluate(film, wi, wo, form)
@@ -160,7 +159,7 @@ def _as_thick(film: Any, thickness: Scalar, form: Any) -> Any:
     return film
 
 
-def _scattered(crust: Crust, eta: Scalar, thickness: Scalar, wi: Vec3, wo: Vec3) -> Colour | None:
+def _scattered(crust: Crust, eta: Scalar, thickness: Scalar, wi: Direction, wo: Direction) -> Colour | None:
     """Light that film and crust scatter, or None where neither does."""
     total: Any = None
     if crust.albedo is not None and crust.depth is not None:
@@ -174,10 +173,10 @@ def _scattered(crust: Crust, eta: Scalar, thickness: Scalar, wi: Vec3, wo: Vec3)
 
 
 @chunk
-def scattered_once(wi: Vec3, wo: Vec3, eta: Scalar, albedo: Colour, depth: Scalar, g: Scalar) -> Colour:
+def scattered_once(wi: Direction, wo: Direction, eta: Scalar, albedo: Colour, depth: Scalar, g: Scalar) -> Colour:
     """BRDF [1/sr] of light that is scattered once below a smooth boundary (Hanrahan and Krueger 1993)."""
-    T = transmittance_dielectric(wi[2], eta) * transmittance_dielectric(wo[2], eta)
+    T = transmittance_dielectric(wi[-1], eta) * transmittance_dielectric(wo[-1], eta)
     wi = refract_about_normal(wi, eta)
     wo = refract_about_normal(wo, eta)
     phase = henyey_greenstein(1.0 + dot(wi, wo), g)
-    return T / (eta * eta) * scattered_back(phase, albedo, depth, wi[2], wo[2])
+    return T / (eta * eta) * scattered_back(phase, albedo, depth, wi[-1], wo[-1])

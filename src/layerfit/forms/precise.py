@@ -6,11 +6,10 @@
 import dataclasses
 from typing import Any
 
-import jax.numpy as jnp
-
 from .._chunk import where
-from .._types import Colour, Vec3
+from .._types import Colour, Direction
 from ..layers import Coat
+from ..optics.directions import above, both_above
 from ..surfaces.microfacet import Conductor
 from . import one_coat, two_coats
 from .tables import Kind
@@ -72,12 +71,10 @@ def held(prepared: Prepared) -> dict[str, Any]:
     return {name: getattr(prepared, name) for name in form.HELD}
 
 
-def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, options: Precise) -> Colour:
+def evaluate(prepared: Prepared, wi: Direction, wo: Direction, options: Precise) -> Colour:
     """BRDF [1/sr] of unit directions above the surface; 0 where either is below it."""
-    lit = (wi[2] > 0.0) & (wo[2] > 0.0)
-    up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = where(lit, wi, up)
-    wo = where(lit, wo, up)
+    lit = both_above(wi, wo)
+    wi, wo = above(lit, wi), above(lit, wo)
     if isinstance(prepared, two_coats.Prepared):
         return where(lit, two_coats.evaluate(prepared, wi, wo), 0.0)
     return where(lit, one_coat.evaluate(prepared, wi, wo), 0.0)

@@ -15,9 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._chunk import chunk, clip, safe_divide, safe_power, safe_sqrt, struct, where
-from .._types import Colour, Scalar, Vec3
+from .._chunk import chunk, clip, dot, safe_divide, safe_power, safe_sqrt, struct, where
+from .._types import Colour, Direction, Scalar
 from ..layers import Coat
+from ..optics.directions import along, direction
 from . import one_coat, tables
 from .bounces import Curve, amount, bounces, cells_of
 from .curves import Interface, Nodes, P, absorbed, bake, diffuse_return, gauss, polynomial, presence
@@ -72,7 +73,7 @@ class _Top:
         """Cosine at the edge of total reflection."""
         return safe_sqrt((self.eta - 1.0) * (self.eta + 1.0)) / self.eta
 
-    def passes(self, w: Vec3) -> Crossing:
+    def passes(self, w: Direction) -> Crossing:
         return pass_interface(self.interface, self.eta, self.alpha, w)
 
     def reflects(self, z: Float[Array, " k"]) -> Float[Array, " k"]:
@@ -84,8 +85,8 @@ class _Top:
         order = jnp.argsort(known)
         known, R = known[order], R[order]
         # Not `jnp.interp`, which looks nodes up: a page computes this too, and has no step for that.
-        along = clip(safe_divide(z[:, None] - known[:-1], jnp.diff(known)), 0.0, 1.0)
-        return R[0] + along @ jnp.diff(R)
+        passed = clip(safe_divide(z[:, None] - known[:-1], jnp.diff(known)), 0.0, 1.0)
+        return R[0] + passed @ jnp.diff(R)
 
 
 def prepare(outer: Coat, inner: Coat, base: Any, kind: Kind) -> Prepared:
@@ -104,12 +105,12 @@ def prepare(outer: Coat, inner: Coat, base: Any, kind: Kind) -> Prepared:
     return Prepared(coats, first.interface, both, passed, inner_again, inner_rest, base, returned, again, rest)
 
 
-def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3) -> Colour:
+def evaluate(prepared: Prepared, wi: Direction, wo: Direction) -> Colour:
     """BRDF [1/sr] of unit directions above the surface."""
     return prepared.coats[0].evaluate(wi, wo) + below(prepared, wi, wo)
 
 
-def below(prepared: Prepared, wi: Vec3, wo: Vec3) -> Colour:
+def below(prepared: Prepared, wi: Direction, wo: Direction) -> Colour:
     """Light from below the outer coat's top [1/sr]."""
     p = prepared
     outer, inner = p.coats
@@ -144,13 +145,13 @@ def absorbed_above(i1: Crossing, o1: Crossing, i: Crossing, o: Crossing, prepare
 
 
 @chunk
-def upwards(w: Vec3, eta: Scalar) -> Vec3:
+def upwards(w: Direction, eta: Scalar) -> Direction:
     """A direction below a smooth boundary, as it is above it; `eta` is the index below over that above."""
-    x, y = eta * w[0], eta * w[1]
-    sine = safe_sqrt(x * x + y * y)
+    part = eta * along(w)
+    sine = safe_sqrt(dot(part, part))
     held = jnp.minimum(1.0, 0.9998 / jnp.maximum(sine, 1e-6))
     sine = jnp.minimum(sine, 0.9998)
-    return jnp.stack([x * held, y * held, safe_sqrt((1.0 - sine) * (1.0 + sine))])
+    return direction(part * held, safe_sqrt((1.0 - sine) * (1.0 + sine)))
 
 
 def _way(first: _Top, second: _Top, coats: tuple[Coat, Coat]) -> tuple[Float[Array, "m 3"], Crossing, Crossing, Crossing]:
@@ -166,14 +167,14 @@ def _directions(z: Float[Array, " m"]) -> Float[Array, "m 3"]:
     return jnp.stack([safe_sqrt((1.0 - z) * (1.0 + z)), jnp.zeros_like(z), z], -1)
 
 
-def _into(top: _Top, eta: Scalar, w: Vec3) -> Crossing:
+def _into(top: _Top, eta: Scalar, w: Direction) -> Crossing:
     """Follow one direction of the outer coat into the inner one, whose index is `eta` of that coat's."""
     down = top.passes(w)
     # From the denser side the way of light from the rarer one, turned round: its direction is above, its spreads are as much wider.
     w2 = upwards(w, top.eta)
     up = top.passes(w2)
-    widens = top.eta * top.eta * steepness(w2[2]) / steepness(up.w[2])
-    path = 1.0 / w2[2] + widens * (up.path - 1.0 / up.w[2])
+    widens = top.eta * top.eta * steepness(w2[-1]) / steepness(up.w[-1])
+    path = 1.0 / w2[-1] + widens * (up.path - 1.0 / up.w[-1])
     theta = up.theta * jnp.minimum(widens, STEEPEST)
     turned = Crossing(w2, up.T, top.eta * up.a, jnp.minimum(path, STEEPEST), theta, up.s)
     return jax.tree.map(lambda x, y: where(eta >= 1.0, x, y), down, turned)
@@ -186,12 +187,12 @@ def steepness(z: Scalar) -> Scalar:
 
 def _after(a: Crossing, b: Crossing, eta: Scalar) -> Crossing:
     """One crossing after the other: the spread of the first, as it is refracted, adds to that of the second."""
-    k = jnp.minimum(steepness(b.w[2]) / steepness(a.w[2]) / (eta * eta), STEEPEST)
-    before = (a.path - 1.0 / a.w[2]) * k
-    own = jnp.maximum(b.path - 1.0 / b.w[2], 0.0)
+    k = jnp.minimum(steepness(b.w[-1]) / steepness(a.w[-1]) / (eta * eta), STEEPEST)
+    before = (a.path - 1.0 / a.w[-1]) * k
+    own = jnp.maximum(b.path - 1.0 / b.w[-1], 0.0)
     theta = (own * b.theta + before * a.theta * k) / jnp.maximum(own + before, 1e-6)
     spread = safe_power(safe_power(a.a / eta, P) + safe_power(b.a, P), 1.0 / P)
-    path = 1.0 / b.w[2] + held(own + before)
+    path = 1.0 / b.w[-1] + held(own + before)
     return Crossing(b.w, a.T, spread, path, jnp.maximum(held(theta), 1e-4), a.s)
 
 

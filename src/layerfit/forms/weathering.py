@@ -13,10 +13,11 @@ import jax.numpy as jnp
 
 from .._chunk import chunk, member, safe_divide, struct, where
 from .._place import Place
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Direction, Scalar
 from ..errors import InputError
 from ..layers import Coat
 from ..layers.weathering import STEPS, Deposit, Erosion, Overgrowth, Polish
+from ..optics.directions import above, both_above
 from ..optics.fresnel import transmittance_dielectric
 from ..optics.scattering import kubelka_munk, kubelka_munk_over
 from ..surfaces import Conductor, Dielectric, Lambert
@@ -174,12 +175,10 @@ def history(prepared: Prepared) -> Lies:
     return stack
 
 
-def evaluate(prepared: Prepared, wi: Vec3, wo: Vec3, form: Any) -> Colour:
+def evaluate(prepared: Prepared, wi: Direction, wo: Direction, form: Any) -> Colour:
     """BRDF [1/sr] of unit directions above the surface; 0 where either is below it. No form changes it."""
-    lit = (wi[2] > 0.0) & (wo[2] > 0.0)
-    up = jnp.array([0.0, 0.0, 1.0], wi.dtype)
-    wi = where(lit, wi, up)
-    wo = where(lit, wo, up)
+    lit = both_above(wi, wo)
+    wi, wo = above(lit, wi), above(lit, wo)
     stack = history(prepared)
     top, covered, bare = _open_boundary(stack)
     albedo = prepared.albedo
@@ -218,8 +217,8 @@ def _open_boundary(stack: Lies) -> tuple[_Boundary, Scalar, Scalar]:
 
 
 @chunk
-def below_boundary(wi: Vec3, wo: Vec3, eta: Scalar, escape: Scalar, albedo: Colour) -> Colour:
+def below_boundary(wi: Direction, wo: Direction, eta: Scalar, escape: Scalar, albedo: Colour) -> Colour:
     """BRDF [1/sr] of a diffuse body of this albedo below a smooth boundary (Saunderson 1942, per direction)."""
-    T = transmittance_dielectric(wi[2], eta) * transmittance_dielectric(wo[2], eta)
+    T = transmittance_dielectric(wi[-1], eta) * transmittance_dielectric(wo[-1], eta)
     kept = jnp.maximum(1.0 - albedo + albedo * escape, 1e-6)
     return T / (eta * eta) * (albedo / math.pi) / kept

@@ -21,10 +21,10 @@ def fresnel_dielectric(c: Scalar, eta: Colour) -> Colour:
     refracts = g2 > near_tir
     g = jnp.sqrt(where(refracts, g2, 1.0))
     eta2 = eta * eta
-    perpendicular = (c + g) * (c + g)
-    parallel = (eta2 * c + g) * (eta2 * c + g)
-    rs = -delta / perpendicular
-    rp = delta * ((eta2 + 1.0) * c * c - 1.0) / parallel
+    perpendicular = 1.0 / (c + g)
+    parallel = 1.0 / (eta2 * c + g)
+    rs = delta * (perpendicular * perpendicular)
+    rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel)
     reflectance = 0.5 * (rs * rs + rp * rp)
     return where(eta == 1.0, 0.0, where(refracts, reflectance, 1.0))
 
@@ -34,10 +34,9 @@ def transmittance_dielectric(c: Scalar, eta: Colour) -> Colour:
     """1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection."""
     g = safe_sqrt((eta - 1.0) * (eta + 1.0) + c * c)
     eta2 = eta * eta
-    perpendicular = c + g
-    parallel = eta2 * c + g
-    product = 2.0 * c * g
-    passed = safe_divide(product, perpendicular * perpendicular) + safe_divide(product * eta2, parallel * parallel)
+    perpendicular = safe_divide(1.0, c + g)
+    parallel = safe_divide(1.0, eta2 * c + g)
+    passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel))
     return where(eta == 1.0, 1.0, passed)
 
 
@@ -45,7 +44,7 @@ def transmittance_dielectric(c: Scalar, eta: Colour) -> Colour:
 def fresnel_conductor(c: Scalar, eta: Colour, k: Colour) -> Colour:
     """Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2)."""
     c2 = c * c
-    s2 = (1.0 - c) * (1.0 + c)
+    s2 = 1.0 - c2
     p = (eta - k) * (eta + k) - s2
     nk = eta * k
     q = jnp.sqrt(jnp.maximum(p * p + 4.0 * nk * nk, 1e-24))
@@ -53,12 +52,10 @@ def fresnel_conductor(c: Scalar, eta: Colour, k: Colour) -> Colour:
     larger = jnp.sqrt(0.5 * (q + jnp.abs(p)))
     a = where(p < 0.0, nk / larger, larger)
     twice_ac = 2.0 * a * c
-    rs = (q + c2 - twice_ac) / jnp.maximum(q + c2 + twice_ac, 1e-12)
-    s4 = s2 * s2
-    even = q * c2 + s4
+    # Rp is Rs (even - odd) / (even + odd), so that the mean of both is Rs even / (even + odd).
+    even = q * c2 + s2 * s2
     odd = twice_ac * s2
-    rp = rs * (even - odd) / jnp.maximum(even + odd, 1e-12)
-    return 0.5 * (rs + rp)
+    return (q + c2 - twice_ac) * even / jnp.maximum((q + c2 + twice_ac) * (even + odd), 1e-12)
 
 
 @chunk

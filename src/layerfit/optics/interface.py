@@ -7,7 +7,8 @@ at width 0. `NoW` is the cosine just above the interface, `eta` its relative ind
 import jax.numpy as jnp
 
 from .._chunk import chunk, safe_divide, safe_power, safe_sqrt
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Direction, Scalar
+from .directions import along, direction, sine2
 from .fresnel import transmittance_dielectric
 
 
@@ -34,9 +35,9 @@ def drift_scale(eta: Scalar, alpha: Scalar) -> Scalar:
 
 
 @chunk
-def facet_cosine(w: Vec3, tilt: Scalar) -> Scalar:
+def facet_cosine(w: Direction, tilt: Scalar) -> Scalar:
     """Cosine between a direction and the facets that it meets."""
-    return safe_sqrt(w[2] * w[2] + tilt * (w[0] * w[0] + w[1] * w[1]))
+    return safe_sqrt(tilt + (1.0 - tilt) * (w[-1] * w[-1]))
 
 
 @chunk
@@ -51,9 +52,9 @@ def rough_transmittance(c: Scalar, eta: Scalar, gain: Scalar) -> Colour:
 
 
 @chunk
-def drift(w: Vec3, scale: Scalar, alpha: Scalar) -> Scalar:
+def drift(w: Direction, scale: Scalar, alpha: Scalar) -> Scalar:
     """Path added near grazing angles, where the facets that face the light take most of it."""
-    one_minus = (w[0] * w[0] + w[1] * w[1]) / (1.0 + w[2])
+    one_minus = sine2(w) / (1.0 + w[-1])
     return scale * safe_power(one_minus, 3.16) * jnp.exp(-7.0 * alpha * one_minus)
 
 
@@ -67,11 +68,10 @@ def slope_spread(c: Scalar, eta: Scalar) -> Scalar:
 
 
 @chunk
-def steer(w: Vec3, lengthening: Scalar) -> Vec3:
+def steer(w: Direction, lengthening: Scalar) -> Direction:
     """Turn a direction, azimuth kept, until its path 1 / w.z is longer by `lengthening`."""
-    z = safe_divide(w[2], 1.0 + lengthening * w[2])
+    z = safe_divide(w[-1], 1.0 + lengthening * w[-1])
     # The squared sine grows by w.z^2 - z^2 = lengthening z w.z (w.z + z): written so, nothing cancels at the normal.
-    sine2 = w[0] * w[0] + w[1] * w[1]
-    growth = safe_divide(lengthening * z * w[2] * (w[2] + z), sine2)
+    growth = safe_divide(lengthening * z * w[-1] * (w[-1] + z), sine2(w))
     ratio = safe_sqrt(1.0 + growth)
-    return jnp.stack([w[0] * ratio, w[1] * ratio, z])
+    return direction(along(w) * ratio, z)

@@ -14,22 +14,23 @@ import jax
 import jax.numpy as jnp
 
 from .._chunk import chunk, dot, safe_divide, safe_sqrt, where
-from .._types import Scalar, Vec3
+from .._types import Direction, Scalar, Vec3
+from .directions import sine2
 
 Distribution = Literal["ggx", "beckmann"]
 Masking = Literal["smith", "smith_separable", "vcavity"]
 Width = Scalar | tuple[Scalar, Scalar]
 
+_INV_PI = 1.0 / math.pi
 _INV_SQRT_PI = 1.0 / math.sqrt(math.pi)
 
 
 @chunk
-def ggx_d(h: Vec3, alpha: Scalar) -> Scalar:
+def ggx_d(h: Direction, alpha: Scalar) -> Scalar:
     """GGX density of facet normals (Walter et al. 2007, eq. 33)."""
-    # |h.xy|^2 / alpha^2 + h.z^2, never NoH^2 (alpha^2 - 1) + 1: that cancels where alpha is small.
-    e = (h[0] * h[0] + h[1] * h[1]) / (alpha * alpha) + h[2] * h[2]
-    root = 1.0 / (e * alpha)
-    return root * root / jnp.pi
+    # |h.xy|^2 + alpha^2 h.z^2, never NoH^2 (alpha^2 - 1) + 1: that cancels where alpha is small.
+    root = alpha / (sine2(h) + alpha * alpha * (h[-1] * h[-1]))
+    return root * root * _INV_PI
 
 
 @chunk
@@ -37,14 +38,14 @@ def ggx_d_anisotropic(h: Vec3, alpha_x: Scalar, alpha_y: Scalar) -> Scalar:
     """Anisotropic GGX density of facet normals (Burley 2012, eq. 13)."""
     x = h[0] / alpha_x
     y = h[1] / alpha_y
-    e = x * x + y * y + h[2] * h[2]
+    e = x * x + y * y + h[-1] * h[-1]
     return 1.0 / (jnp.pi * alpha_x * alpha_y * e * e)
 
 
 @chunk
-def beckmann_d(h: Vec3, alpha: Scalar) -> Scalar:
+def beckmann_d(h: Direction, alpha: Scalar) -> Scalar:
     """Beckmann density of facet normals (Cook and Torrance 1982, eq. 14, normalised)."""
-    return beckmann_by_slopes((h[0] * h[0] + h[1] * h[1]) / (alpha * alpha), h[2], alpha * alpha)
+    return beckmann_by_slopes(sine2(h) / (alpha * alpha), h[-1], alpha * alpha)
 
 
 @chunk
@@ -52,7 +53,7 @@ def beckmann_d_anisotropic(h: Vec3, alpha_x: Scalar, alpha_y: Scalar) -> Scalar:
     """Anisotropic Beckmann density of facet normals (Heitz 2014, eq. 80)."""
     x = h[0] / alpha_x
     y = h[1] / alpha_y
-    return beckmann_by_slopes(x * x + y * y, h[2], alpha_x * alpha_y)
+    return beckmann_by_slopes(x * x + y * y, h[-1], alpha_x * alpha_y)
 
 
 def beckmann_by_slopes(stretched_xy2: Scalar, z: Scalar, area: Scalar) -> Scalar:
@@ -64,7 +65,7 @@ def beckmann_by_slopes(stretched_xy2: Scalar, z: Scalar, area: Scalar) -> Scalar
     return where(above, jnp.exp(-stretched_xy2 * inverse) * (inverse * inverse) / (jnp.pi * area), 0.0)
 
 
-def density(distribution: Distribution, h: Vec3, alpha: Width) -> Scalar:
+def density(distribution: Distribution, h: Direction, alpha: Width) -> Scalar:
     """D(h) [1/sr], normalised so that the integral of D(h) h.z is 1."""
     if isinstance(alpha, tuple):
         anisotropic = ggx_d_anisotropic if distribution == "ggx" else beckmann_d_anisotropic
@@ -78,9 +79,10 @@ def ggx_lambda(x: Any) -> Any:
 
 
 @chunk
-def ggx_projection(w: Vec3, alpha: Scalar) -> Scalar:
+def ggx_projection(w: Direction, alpha: Scalar) -> Scalar:
     """NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out)."""
-    return safe_sqrt(w[2] * w[2] + alpha * alpha * (w[0] * w[0] + w[1] * w[1]))
+    a2 = alpha * alpha
+    return safe_sqrt(a2 + (1.0 - a2) * (w[-1] * w[-1]))
 
 
 @chunk
@@ -88,13 +90,13 @@ def ggx_projection_anisotropic(w: Vec3, alpha_x: Scalar, alpha_y: Scalar) -> Sca
     """NoW (1 + 2 Lambda) of the anisotropic GGX distribution (Heitz 2014, eqs. 72 and 80)."""
     x = alpha_x * w[0]
     y = alpha_y * w[1]
-    return safe_sqrt(w[2] * w[2] + x * x + y * y)
+    return safe_sqrt(w[-1] * w[-1] + x * x + y * y)
 
 
 @chunk
-def beckmann_projection(w: Vec3, alpha: Scalar) -> Scalar:
+def beckmann_projection(w: Direction, alpha: Scalar) -> Scalar:
     """NoW (1 + 2 Lambda) of the Beckmann distribution (Heitz 2014, eq. 66, multiplied out)."""
-    return _beckmann_projection(w[2], alpha * alpha * (w[0] * w[0] + w[1] * w[1]))
+    return _beckmann_projection(w[-1], alpha * alpha * sine2(w))
 
 
 @chunk
@@ -102,7 +104,7 @@ def beckmann_projection_anisotropic(w: Vec3, alpha_x: Scalar, alpha_y: Scalar) -
     """NoW (1 + 2 Lambda) of the anisotropic Beckmann distribution (Heitz 2014, eqs. 66 and 80)."""
     x = alpha_x * w[0]
     y = alpha_y * w[1]
-    return _beckmann_projection(w[2], x * x + y * y)
+    return _beckmann_projection(w[-1], x * x + y * y)
 
 
 def _beckmann_projection(NoW: Scalar, slope2: Scalar) -> Scalar:
@@ -112,7 +114,7 @@ def _beckmann_projection(NoW: Scalar, slope2: Scalar) -> Scalar:
     return NoW * jax.lax.erf(q) + slope * jnp.exp(-q * q) * _INV_SQRT_PI
 
 
-def projection(distribution: Distribution, w: Vec3, alpha: Width) -> Scalar:
+def projection(distribution: Distribution, w: Direction, alpha: Width) -> Scalar:
     """NoW (1 + 2 Lambda(w)): twice the projected area of the facets minus that of the plane. Finite at grazing angles."""
     if isinstance(alpha, tuple):
         anisotropic = ggx_projection_anisotropic if distribution == "ggx" else beckmann_projection_anisotropic
@@ -133,32 +135,33 @@ def v_smith_separable(NoL: Scalar, NoV: Scalar, projection_l: Scalar, projection
 
 
 @chunk
-def v_cavity(wi: Vec3, wo: Vec3) -> Scalar:
+def v_cavity(wi: Direction, wo: Direction) -> Scalar:
     """G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10)."""
     s = wi + wo
-    NoH_over_c = 2.0 * s[2] / jnp.maximum(dot(s, s), 1e-20)
-    return jnp.minimum(safe_divide(0.25, wi[2] * wo[2]), safe_divide(0.5 * NoH_over_c, jnp.maximum(wi[2], wo[2])))
+    NoH_over_c = 2.0 * s[-1] / jnp.maximum(dot(s, s), 1e-20)
+    return jnp.minimum(safe_divide(0.25, wi[-1] * wo[-1]), safe_divide(0.5 * NoH_over_c, jnp.maximum(wi[-1], wo[-1])))
 
 
-def visibility(masking: Masking, distribution: Distribution, wi: Vec3, wo: Vec3, alpha: Width) -> Scalar:
+def visibility(masking: Masking, distribution: Distribution, wi: Direction, wo: Direction, alpha: Width) -> Scalar:
     """V = G / (4 NoL NoV) [no unit], finite at grazing angles."""
     if masking == "vcavity":
         return v_cavity(wi, wo)
     projection_i = projection(distribution, wi, alpha)
     projection_o = projection(distribution, wo, alpha)
-    return (v_smith if masking == "smith" else v_smith_separable)(wi[2], wo[2], projection_i, projection_o)
+    return (v_smith if masking == "smith" else v_smith_separable)(wi[-1], wo[-1], projection_i, projection_o)
 
 
 @chunk
-def half_vector(wi: Vec3, wo: Vec3) -> Vec3:
+def half_vector(wi: Direction, wo: Direction) -> Direction:
     """The unit vector halfway between two directions on the same side of the surface."""
     s = wi + wo
-    return s / jnp.sqrt(jnp.maximum(dot(s, s), 1e-20))
+    return s * jax.lax.rsqrt(jnp.maximum(dot(s, s), 1e-20))
 
 
 @chunk
-def half_cosine(wi: Vec3, wo: Vec3) -> Scalar:
+def half_cosine(wi: Direction, wo: Direction) -> Scalar:
     """The cosine between either direction and their half vector."""
     # |wi + wo| / 2: the dot product with the half vector loses it near 0 (grazing, opposite).
     s = wi + wo
-    return jnp.minimum(0.5 * safe_sqrt(dot(s, s)), 1.0)
+    s2 = jnp.maximum(dot(s, s), 1e-20)
+    return jnp.minimum(0.5 * s2 * jax.lax.rsqrt(s2), 1.0)

@@ -22,13 +22,19 @@ from ..forms.precise import BAKED, Precise, held
 from ..optics.lazanyi import fit_lazanyi
 from ..preset import left_out, model_name
 from ..stack import PREPARED, Stack, at, evaluate, prepared
+from .bounds import ANY, Bounds
 from .glsl import literal
 from .printer import PREFIX, Printer, named_leaves
 
 SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ()), "sky": ("float", ())}
 """What a material may read of a place: its type in the shader and in JAX."""
 
+UNIT = 1e-5
+"""What a direction's length may be off 1."""
+
 COSINES = "cosines"
+FREE = "free"
+"""How a shader holds directions where it has no frame: their cosines alone, or the part along the surface in any space and the cosine."""
 
 MAPS, TILT, AT_UV = "maps", "tilt", "at_uv"
 """What the example entry point does where values come from textures: reads them, tilts the normal, and is given texture coordinates."""
@@ -61,7 +67,11 @@ class Shader:
         told = {TANGENT} if self.tangent else set()
         told |= {MAPS} if self.parameters else set()
         told |= {TILT} if TILT in self.maps else set()
-        return asks(self.stack) | told | ({AT_UV} if self.maps or "uv" in self.stack.reads else set())
+        return (
+            (asks(self.stack) - ({FREE} if self.tangent else set()))
+            | told
+            | ({AT_UV} if self.maps or "uv" in self.stack.reads else set())
+        )
 
     @property
     def parameters(self) -> tuple[tuple[str, str, str], ...]:
@@ -127,8 +137,9 @@ def asks(stack: Stack) -> frozenset[str]:
     """What the templates are to bring for a material, and whether it asks for cosines alone in place of two directions."""
     layers = (*stack.layers, stack.base)
     tangent = {TANGENT} if any(needs_tangent(layer) for layer in layers) else set()
-    cosines = {COSINES} if getattr(stack.base, "by_cosines", False) and not stack.layers else set()
-    return frozenset(stack.reads) | tangent | cosines
+    cosines = getattr(stack.base, "by_cosines", False) and not stack.layers
+    directions = {COSINES} if cosines else tangent or {FREE}
+    return frozenset(stack.reads) | directions
 
 
 def approximations(stack: Stack) -> list[str]:
@@ -163,22 +174,26 @@ def print_material(
 
     `maps` are parameters that differ from place to place, such as "coat.thickness_um": they become parameters of `lf_brdf`, and the example
     entry point reads each from a texture `u_coat_thickness_um`; all others are constants. With "tilt" among them the entry point tilts the
-    normal by the slopes in the texture `u_tilt`, along a tangent that it is given (`tangent`), else in the frame that `lf_brdf` makes of the
+    normal by the slopes in the texture `u_tilt`, along a tangent that it is given (`tangent`), else in a frame of the
     normal alone. Raises `InputError` for a parameter that the material does not have, or that a shader cannot compute its constants from.
     """
     stack = stack.astype(jnp.float32)
     _check_maps(stack, maps, uniforms)
     printer = Printer(CHUNKS)
-    w = jnp.array([0.0, 0.0, 1.0], jnp.float32)
-    inputs = [(w, "wi"), (w, "wo"), *((jnp.zeros(SIZES[name][1], jnp.float32), name) for name in stack.reads)]
+    free = FREE in asks(stack) and not tangent
+    w = jnp.array([0.0, 0.0, 0.0, 1.0] if free else [0.0, 0.0, 1.0], jnp.float32)
+    within = Bounds(-1.0 - UNIT, 1.0 + UNIT)
+    inputs = [(w, "wi", within), (w, "wo", within)]
+    inputs += [(jnp.zeros(SIZES[name][1], jnp.float32), name, ANY) for name in stack.reads]
     cosines = COSINES in asks(stack)
     if cosines:
-        inputs = [(jnp.ones((), jnp.float32), name) for name in ("NoL", "NoV", "lean2")]
+        one = jnp.ones((), jnp.float32)
+        inputs = [(one, "NoL", within), (one, "NoV", within), (one, "lean2", Bounds(0.0, 4.0 + UNIT))]
 
     def shade(prepared: Any, wi: Any, wo: Any, *place: Any) -> Any:
         if cosines:
             (lean2,) = place
-            return jnp.broadcast_to(where((wi > 0.0) & (wo > 0.0), prepared.shade(wi, wo, lean2), 0.0), (3,))
+            return jnp.broadcast_to(where(jnp.minimum(wi, wo) > 0.0, prepared.shade(wi, wo, lean2), 0.0), (3,))
         there = Place(**dict(zip(stack.reads, place, strict=True))) if place else None
         return jnp.broadcast_to(evaluate(stack.form, at(prepared, there), wi, wo), (3,))
 
@@ -197,12 +212,12 @@ def print_material(
         values = {f"u_{name}": np.asarray(leaf) for leaf, name, _, _ in given} if uniforms else {}
         structure = jax.tree.structure(stack)
         constants = _held(stack)
-        inputs += [(row[0], row[1]) for row in rows if row and row[1] in mapped]
+        inputs += [(row[0], row[1], ANY) for row in rows if row and row[1] in mapped]
 
         def local(*args: Any) -> Any:
-            free, there = iter(args[: len(given)]), iter(args[len(args) - len(mapped) :])
+            fixed, there = iter(args[: len(given)]), iter(args[len(args) - len(mapped) :])
             values = [
-                leaf if not row else next(there) if row[1] in mapped else next(free)
+                leaf if not row else next(there) if row[1] in mapped else next(fixed)
                 for row, leaf in zip(rows, leaves, strict=True)
             ]
             live: Stack = jax.tree.unflatten(structure, values)
@@ -226,8 +241,12 @@ def print_material(
             live = jax.tree.unflatten(structure, jax.tree.leaves(args[: -len(inputs)]))
             return shade(live, *args[-len(inputs) :])
 
-    local.__doc__ = "BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine."
-    printer.function(local, f"{PREFIX}{'shade' if cosines else 'evaluate'}", outside, inputs)
+    local.__doc__ = (
+        "BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine."
+        if free
+        else "BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine."
+    )
+    printer.function(local, f"{PREFIX}{'shade' if cosines else 'evaluate'}", outside, inputs, constant=not uniforms)
     shader = Shader(name, stack, "", values, tuple(maps), tangent)
     frame = template("cosines.glsl" if cosines else "brdf.glsl", shader.asks, shader.parameters)
     functions = "\n".join(part for part in (printer.structs_text(), declarations, printer.functions_text(), frame) if part)

@@ -87,6 +87,8 @@ def _select(body: Any, eqn: Any, which: Value, *cases: Value) -> Value:
         kind = f"vec{which.type[-1]}"
     no, yes = (lift(case, kind) for case in cases)
     if which.type == "bool":
+        # Both are computed before the choice: a compiler makes a branch of a choice between expressions that are not.
+        no, yes = body.locals("value", no, yes)
         parts = [bracketed(v, CHOICE, True) for v in (which, yes, no)]
         return Value(f"{parts[0]} ? {parts[1]} : {parts[2]}", kind, CHOICE, reads(which, no, yes))
     return Value(f"mix({no.text}, {yes.text}, {which.text})", kind, reads=reads(which, no, yes))
@@ -149,6 +151,9 @@ def _clamp(body: Any, eqn: Any, low: Value, x: Value, high: Value) -> Value:
 
 BUILTINS = {"dot", "vec2", "vec3", "vec4"}
 """Traced functions that GLSL has by the same name."""
+
+GUARDS = {"above"}
+"""Traced functions that keep derivatives finite where a value is not used: in a shader, their last operand."""
 
 PRIMITIVES: dict[str, Callable[..., Value]] = {
     "add": _operator("+", SUM, "0.0", neutral_left=True),

@@ -14,9 +14,10 @@ import jax
 import numpy as np
 from jax.extend.core import Literal
 
+from .bounds import ANY, Bounds, exactly, known, read, resolved, settled
 from .glsl import ATOM, PREFIX, UNARY, PrintError, StructType, Value, glsl_type, indent, lift, literal, reads, safe
 from .names import name_of, source_of
-from .primitives import BUILTINS, PRIMITIVES
+from .primitives import BUILTINS, GUARDS, PRIMITIVES
 
 
 class Printer:
@@ -38,11 +39,11 @@ class Printer:
         return "\n".join([*self.arrays.values(), *self.helpers.values(), *(text for _, text in self.functions.values())])
 
     def array(self, value: np.ndarray) -> str:
-        """Declare a row of numbers as a constant; returns its name."""
-        rows = ", ".join(literal(v) for v in value)
-        key = f"float[{len(value)}]({rows})"
+        """Declare a table, numbers or vectors, as a constant; returns its name."""
+        kind, rows = glsl_type(value[0]), ", ".join(literal(v) for v in value)
+        key = f"{kind}[{len(value)}]({rows})"
         if key not in self.arrays:
-            self.arrays[key] = f"const float {PREFIX}row{len(self.arrays) + 1}[{len(value)}] = {key};\n"
+            self.arrays[key] = f"const {kind} {PREFIX}row{len(self.arrays) + 1}[{len(value)}] = {key};\n"
         return self.arrays[key].split("[")[0].split()[-1]
 
     def struct(self, example: Any, leaves: Sequence[tuple[str, str]]) -> StructType:
@@ -78,16 +79,22 @@ class Printer:
         return f"uniform {kind} {name};\n"
 
     def function(
-        self, fn: Callable[..., Any], name: str, given: Sequence[tuple[Any, str]], params: Sequence[tuple[Any, str]]
+        self,
+        fn: Callable[..., Any],
+        name: str,
+        given: Sequence[tuple[Any, str]],
+        params: Sequence[tuple[Any, str, Bounds]],
+        constant: bool = False,
     ) -> None:
         """Print `fn(*given, *params)` as the GLSL function `name`.
 
         `given` are pytrees that stand outside the function (constants, uniforms), each with the expression to reach it, its leaves by
-        field; `params` are arrays that become parameters.
+        field; `params` are arrays that become parameters, each with what it can be. Numbers that are `constant` are those of `given`.
         """
-        trees = [tree for tree, _ in (*given, *params)]
-        closed = jax.make_jaxpr(fn)(*trees)
-        body = Body(self, closed.jaxpr, closed.consts)
+        closed = jax.make_jaxpr(fn)(*(tree for tree, _ in given), *(array for array, _, _ in params))
+        numbers = [leaf for tree, _ in given for leaf in jax.tree.leaves(tree)]
+        bounds = [*((exactly(leaf) if constant else ANY) for leaf in numbers), *(limits for _, _, limits in params)]
+        body = Body(self, closed.jaxpr, closed.consts, bounds)
         names: list[str] = []
         for tree, text in given:
             for path, leaf in _leaves(tree):
@@ -97,7 +104,7 @@ class Printer:
             if dataclasses.is_dataclass(tree):
                 self.struct(tree, [(path, glsl_type(np.asarray(leaf, np.float32))) for path, leaf in _leaves(tree)])
         declared = []
-        for array, param in params:
+        for array, param, _ in params:
             declared.append(f"{glsl_type(array)} {param}")
             body.parameter(param, glsl_type(array))
             body.bind_next(Value(param, glsl_type(array), reads=frozenset({param})))
@@ -107,8 +114,13 @@ class Printer:
         text = f"{doc}{kind} {name}({', '.join(declared)}) {{\n{indent(body.text(lift(result, kind)))}}}\n"
         self.functions[name] = (name, text)
 
-    def chunk(self, name: str, closed: Any) -> tuple[str, list[tuple[str, str, StructType | None]], StructType | None]:
-        """Print a chunk once; returns its GLSL name, its parameters as (name, type, struct) and the struct that it returns."""
+    def chunk(
+        self, name: str, closed: Any, bounds: Sequence[Bounds]
+    ) -> tuple[str, list[tuple[str, str, StructType | None]], StructType | None]:
+        """Print a chunk once; returns its GLSL name, its parameters as (name, type, struct) and the struct that it returns.
+
+        `bounds` are what its arguments can be, here: where they make another text of it, that is a function of its own.
+        """
         jaxpr, fn = closed.jaxpr, self.chunks[name]
         info = jaxpr.debug_info
         notes = inspect.get_annotations(fn)
@@ -125,7 +137,7 @@ class Printer:
                 )
             ((_, leaves),) = _group(_result_paths(info, notes["return"]), [v.aval for v in jaxpr.outvars])
             returned = self.struct(notes["return"], leaves)
-        body = Body(self, jaxpr, closed.consts)
+        body = Body(self, jaxpr, closed.consts, bounds)
         for (root, kind, struct), (_, leaves) in zip(params, groups, strict=True):
             root = safe(root)
             for leaf, leaf_kind in leaves:
@@ -149,28 +161,47 @@ class Printer:
 
 
 class _Frame:
-    """The values of one jaxpr while it is printed, and how often each is still needed."""
+    """The values of one jaxpr while it is printed, what they can be, and how often each is still needed."""
 
-    def __init__(self, printer: Printer, jaxpr: Any, consts: Sequence[Any]):
+    def __init__(self, printer: Printer, jaxpr: Any, consts: Sequence[Any], bounds: Sequence[Bounds]):
         self.values: dict[Any, Value] = {}
-        self.left: dict[Any, int] = {v: 1 for v in jaxpr.outvars if not isinstance(v, Literal)}
+        self.bounds = known(jaxpr, consts, bounds)
+        self.same = settled(jaxpr, self.bounds)
+        self.left: dict[Any, int] = {}
+        self.named_by = {kept: eqn for eqn in jaxpr.eqns if not isinstance(kept := self.same.get(eqn.outvars[0]), Literal)}
         self.live = []
+        for v in jaxpr.outvars:
+            self._need(v)
         for eqn in reversed(jaxpr.eqns):
             if any(v in self.left for v in eqn.outvars):
                 self.live.append(eqn)
                 for v in eqn.invars:
-                    if not isinstance(v, Literal):
-                        self.left[v] = self.left.get(v, 0) + 1
+                    self._need(v)
         self.live.reverse()
         for var, value in zip(jaxpr.constvars, consts, strict=True):
             if var not in self.left:
                 continue
-            row = var.aval.ndim == 1 and var.aval.size > 4
+            row = var.aval.ndim == 2 or (var.aval.ndim == 1 and var.aval.size > 4)
             self.values[var] = (
                 Value(printer.array(np.asarray(value)), "row") if row else Value(literal(value), glsl_type(var.aval))
             )
 
+    def _need(self, var: Any) -> None:
+        var = resolved(self.same, var)
+        if not isinstance(var, Literal):
+            self.left[var] = self.left.get(var, 0) + 1
+
+    def name(self, eqn: Any) -> str | None:
+        """What the value of an equation is called in the source: it, or what it is in any case."""
+        later = self.named_by.get(eqn.outvars[0])
+        return name_of(eqn) or (name_of(later) if later else None)
+
+    def limits(self, eqn: Any) -> list[Bounds]:
+        """What the operands of an equation can be."""
+        return [read(self.bounds, v) for v in eqn.invars]
+
     def read(self, var: Any) -> Value:
+        var = resolved(self.same, var)
         if isinstance(var, Literal):
             text = literal(var.val)
             return Value(text, glsl_type(var.aval), UNARY if text.startswith("-") else ATOM)
@@ -184,14 +215,14 @@ class _Frame:
 class Body:
     """The statements of one function."""
 
-    def __init__(self, printer: Printer, jaxpr: Any, consts: Sequence[Any]):
+    def __init__(self, printer: Printer, jaxpr: Any, consts: Sequence[Any], bounds: Sequence[Bounds]):
         self.printer = printer
         self.jaxpr = jaxpr
         self.lines: list[str] = []
         self.taken: set[str] = set()
         self.declared: dict[str, str] = {}
         self.enclosing: list[Any] = []
-        self.frames = [_Frame(printer, jaxpr, consts)]
+        self.frames = [_Frame(printer, jaxpr, consts, bounds)]
         self._params = iter(jaxpr.invars)
 
     def parameter(self, name: str, kind: str) -> None:
@@ -210,7 +241,7 @@ class Body:
     def _walk(self, frame: _Frame, jaxpr: Any, named: bool) -> list[Value]:
         for eqn in frame.live:
             operands = [frame.read(v) for v in eqn.invars]
-            name = name_of(eqn) if named else None
+            name = frame.name(eqn) if named else None
             results = self._translate(eqn, operands, name)
             if len(results) == 1:
                 (var,) = eqn.outvars
@@ -233,11 +264,22 @@ class Body:
         self.lines.append(f"{declaration}{name} = {value.text};")
         return Value(name, value.type, reads=frozenset({name}))
 
+    def locals(self, name: str, *values: Value) -> list[Value]:
+        """The same values, those that are more than a name or a number as locals, none of which takes the name of another."""
+        named: list[Value] = []
+        before = set(self.taken)
+        for value in values:
+            plain = re.fullmatch(r"-?[\w.]+|[biu]?vec\d\(-?[\w.]+\)", value.text)
+            named.append(value if plain else self.local(name, value))
+            self.taken.update(named[-1].reads)
+        self.taken = before
+        return named
+
     def _free(self, name: str, kind: str) -> bool:
         return self.declared[name] == kind and not any(frame.needs(name) for frame in self.frames)
 
     def _inline(self, eqn: Any, closed: Any, operands: Sequence[Value]) -> list[Value]:
-        frame = _Frame(self.printer, closed.jaxpr, closed.consts)
+        frame = _Frame(self.printer, closed.jaxpr, closed.consts, self.frames[-1].limits(eqn))
         frame.values.update(zip(closed.jaxpr.invars, operands, strict=True))
         self.frames.append(frame)
         self.enclosing.append(eqn)
@@ -254,11 +296,16 @@ class Body:
         primitive = eqn.primitive.name
         if primitive in ("jit", "pjit"):
             closed, called = eqn.params["jaxpr"], eqn.params["name"]
+            if called in GUARDS:
+                return [operands[-1]]
+            if called == "fetch":
+                table, row = operands
+                return [Value(f"{table.text}[{row.text}]", glsl_type(eqn.outvars[0].aval), reads=reads(*operands))]
             if called in BUILTINS:
                 kind = glsl_type(eqn.outvars[0].aval)
                 return [Value(f"{called}({', '.join(a.text for a in operands)})", kind, reads=reads(*operands))]
             if called in self.printer.chunks:
-                return self._call(closed, called, operands, name)
+                return self._call(eqn, closed, called, operands, name)
             return self._inline(eqn, closed, operands)
         if primitive == "custom_jvp_call":
             return self._inline(eqn, eqn.params["call_jaxpr"], operands)
@@ -268,12 +315,14 @@ class Body:
             raise PrintError(f"{self._where(eqn)}: the printer knows no GLSL for the JAX primitive {primitive!r}")
         try:
             glsl_type(eqn.outvars[0].aval)
+            if primitive == "abs" and np.all(self.frames[-1].limits(eqn)[0].high <= 0.0):
+                primitive = "neg"
             return [PRIMITIVES[primitive](self, eqn, *operands)]
         except PrintError as error:
             raise PrintError(f"{self._where(eqn)}: {primitive}: {error}") from None
 
-    def _call(self, closed: Any, called: str, operands: list[Value], name: str | None) -> list[Value]:
-        glsl_name, params, returned = self.printer.chunk(called, closed)
+    def _call(self, eqn: Any, closed: Any, called: str, operands: list[Value], name: str | None) -> list[Value]:
+        glsl_name, params, returned = self.printer.chunk(called, closed, self.frames[-1].limits(eqn))
         rest = list(operands)
         arguments = []
         for _, kind, struct in params:
@@ -309,7 +358,8 @@ class Body:
         start = len(self.lines)
         known, taken = dict(self.declared), set(self.taken)
         self.taken.update(*(value.reads for value in outer))  # read again in the next turn, however early in this one
-        frame = _Frame(self.printer, closed.jaxpr, closed.consts)
+        # What is carried changes from turn to turn.
+        frame = _Frame(self.printer, closed.jaxpr, closed.consts, [ANY] * len(closed.jaxpr.invars))
         items = [Value(f"{row.text}[{counter.text}]", "float", reads=row.reads) for row in rows]
         frame.values.update(zip(closed.jaxpr.invars, [*outer, *state, *items], strict=True))
         self.frames.append(frame)

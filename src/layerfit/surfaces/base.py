@@ -11,7 +11,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Direction, Scalar
 from ..optics.microfacet import Distribution, Width, half_cosine, half_vector
 
 
@@ -43,10 +43,10 @@ class Lobe(ABC):
         """What the lobe takes its colour from, at the half cosine `c`."""
 
     @abstractmethod
-    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Any:
+    def shape(self, wi: Direction, wo: Direction, h: Direction, width: Width | None = None) -> Any:
         """The rest [1/sr], of this lobe or of one widened to `width`; `h` is the half vector."""
 
-    def widened(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, added: Width) -> Any:
+    def widened(self, wi: Direction, wo: Direction, h: Direction, width: Width, added: Width) -> Any:
         """The same of a Gaussian lobe that coats have widened to `width`, and its variance by `added`."""
         return self.shape(wi, wo, h, width)
 
@@ -72,13 +72,13 @@ class Surface:
         """The same boundary under a medium of index `n`, as a shader holds it: what has no index does not change."""
         return self
 
-    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+    def evaluate(self, wi: Direction, wo: Direction) -> Colour:
         """BRDF [1/sr] of directions above the surface."""
         h = half_vector(wi, wo)
         c = half_cosine(wi, wo)
         return self.about(wi, wo, h, c)
 
-    def about(self, wi: Vec3, wo: Vec3, h: Vec3, c: Scalar) -> Colour:
+    def about(self, wi: Direction, wo: Direction, h: Direction, c: Scalar) -> Colour:
         """The same where the half vector `h` and its cosine to the directions are known."""
         parts: list[Any] = [lobe.reflectance(c) * lobe.shape(wi, wo, h) for lobe in self.lobes]
         if self.diffuse is not None:

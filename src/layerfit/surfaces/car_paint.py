@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from .._chunk import safe_sqrt, static
 from .._fields import choice, layer, param
 from .._place import TANGENT, Place
-from .._types import Colour, Number, Scalar, Vec2, Vec3
+from .._types import Colour, Direction, Number, Scalar, Vec2
 from ..optics.flakes import flake_tilt, kept_tilt, lost_variance, tilted_d
 from ..optics.fresnel import fresnel_schlick
 from ..optics.microfacet import Width, density, v_cavity
@@ -57,19 +57,19 @@ class PaintLobe(Lobe):
     def energy(self, reflectance: Colour) -> Colour:
         return jnp.minimum(reflectance, 1.0)
 
-    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+    def shape(self, wi: Direction, wo: Direction, h: Direction, width: Width | None = None) -> Scalar:
         V = v_cavity(wi, wo)
         if self.sparkle is not None and self.tilt is not None:
             return self._flake_d(h, self.sparkle, self.tilt, None) * V
         D = density("beckmann", h, self.alpha if width is None else width)
         return D * V
 
-    def widened(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, added: Width) -> Scalar:
+    def widened(self, wi: Direction, wo: Direction, h: Direction, width: Width, added: Width) -> Scalar:
         if self.sparkle is None or self.tilt is None:
             return self.shape(wi, wo, h, width)
         return self._flake_d(h, self.sparkle, self.tilt, added) * v_cavity(wi, wo)
 
-    def _flake_d(self, h: Vec3, sparkle: Scalar, tilt: Tilt, added: Width | None) -> Scalar:
+    def _flake_d(self, h: Direction, sparkle: Scalar, tilt: Tilt, added: Width | None) -> Scalar:
         """Density of the facets of one flake: they lack the part of the spread that its tilt is drawn of."""
         whole = self.alpha * self.alpha
         own = whole * (1.0 - sparkle) + tilt.lost * (sparkle * whole)

@@ -11,9 +11,10 @@ from typing import Any, Literal
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_divide, safe_sqrt, static, where
+from .._chunk import chunk, dot, safe_divide, safe_sqrt, static, where
 from .._fields import choice, layer, param
-from .._types import Colour, Number, Scalar, Vec3
+from .._types import Colour, Direction, Number, Scalar
+from ..optics.directions import along, sine2
 from ..optics.microfacet import Width
 from .base import Lobe, variance
 from .diffuse import Lambert, TwoParts, kd_param
@@ -29,16 +30,16 @@ def cosine_power(one_minus: Scalar, exponent: Scalar) -> Scalar:
 
 
 @chunk
-def mirror_distance(wi: Vec3, wo: Vec3) -> Scalar:
+def mirror_distance(wi: Direction, wo: Direction) -> Scalar:
     """1 - cos of the angle between `wo` and the mirror direction of `wi`: half of a squared distance."""
-    x, y, z = wi[0] + wo[0], wi[1] + wo[1], wi[2] - wo[2]
-    return 0.5 * (x * x + y * y + z * z)
+    lean, z = along(wi) + along(wo), wi[-1] - wo[-1]
+    return 0.5 * (dot(lean, lean) + z * z)
 
 
 @chunk
-def normal_distance(h: Vec3) -> Scalar:
+def normal_distance(h: Direction) -> Scalar:
     """1 - NoH, without the cancellation near the normal."""
-    return (h[0] * h[0] + h[1] * h[1]) / (1.0 + h[2])
+    return sine2(h) / (1.0 + h[-1])
 
 
 class CosineLobe(TwoParts, Lobe):
@@ -71,14 +72,14 @@ class CosineLobe(TwoParts, Lobe):
     def peak(self, exponent: Scalar) -> Scalar:
         """Value of the normalised lobe of reflectance 1 at its peak [1/sr]."""
 
-    def powered(self, one_minus: Scalar, wi: Vec3, exponent: Scalar | None) -> Scalar:
+    def powered(self, one_minus: Scalar, wi: Direction, exponent: Scalar | None) -> Scalar:
         """The lobe [1/sr] by 1 - cos; `exponent` is that of a widened one, which keeps its light, or None."""
         power = cosine_power(one_minus, self.exponent if exponent is None else exponent)
         if self.scaling == "normalized":
             return self.peak(self.exponent if exponent is None else exponent) * power
         if exponent is not None:
             power = power * (self.peak(exponent) / self.peak(self.exponent))
-        return safe_divide(power, wi[2])
+        return safe_divide(power, wi[-1])
 
 
 def _ks() -> Any:
@@ -108,7 +109,7 @@ class Phong(CosineLobe):
         """cos^s of twice the angle of the facets is about exp(-2 s tan^2), Beckmann's with alpha^2 = 1 / (2 s)."""
         return safe_sqrt(0.5 / self.exponent)
 
-    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+    def shape(self, wi: Direction, wo: Direction, h: Direction, width: Width | None = None) -> Scalar:
         exponent = None if width is None else 0.5 / variance(width)
         return self.powered(mirror_distance(wi, wo), wi, exponent)
 
@@ -132,7 +133,7 @@ class Blinn(CosineLobe):
         """alpha^2 = 2 / (s + 2): that of Beckmann's density with the same peak (Walter et al. 2007, section 5.2)."""
         return safe_sqrt(2.0 / (self.exponent + 2.0))
 
-    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+    def shape(self, wi: Direction, wo: Direction, h: Direction, width: Width | None = None) -> Scalar:
         exponent = None if width is None else jnp.maximum(2.0 / variance(width) - 2.0, 0.0)
         return self.powered(normal_distance(h), wi, exponent)
 

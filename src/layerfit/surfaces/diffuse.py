@@ -4,9 +4,10 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_divide, safe_sqrt, static, where
+from .._chunk import chunk, dot, safe_divide, safe_sqrt, static, where
 from .._fields import choice, layer, param
-from .._types import Colour, Number, Scalar, Vec3
+from .._types import Colour, Direction, Number, Scalar
+from ..optics.directions import along, sine2
 from .base import Surface
 
 
@@ -31,7 +32,7 @@ class Lambert(Diffuse):
     name: str = static(default="base", doc="name of the layer")
     albedo: Number = _albedo()
 
-    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+    def evaluate(self, wi: Direction, wo: Direction) -> Colour:
         """BRDF [1/sr]."""
         return self.albedo / jnp.pi
 
@@ -57,42 +58,44 @@ def kd_param() -> Any:
 
 
 @chunk
-def oren_nayar_qualitative(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour:
+def oren_nayar_qualitative(wi: Direction, wo: Direction, albedo: Colour, sigma: Scalar) -> Colour:
     """Oren and Nayar 1994, eq. 30: diffuse grooves, first order."""
     sigma2 = sigma * sigma
     A = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33)
     B = 0.45 * sigma2 / (sigma2 + 0.09)
     # cos(phi) sin(larger) tan(smaller) is a dot product over the larger cosine: no angles, no 0 / 0.
-    dot_xy = wi[0] * wo[0] + wi[1] * wo[1]
-    return albedo / jnp.pi * (A + B * jnp.maximum(dot_xy, 0.0) / jnp.maximum(wi[2], wo[2]))
+    dot_xy = dot(along(wi), along(wo))
+    return albedo / jnp.pi * (A + B * jnp.maximum(dot_xy, 0.0) / jnp.maximum(wi[-1], wo[-1]))
 
 
 @chunk
-def oren_nayar_full(wi: Vec3, wo: Vec3, albedo: Colour, sigma: Scalar) -> Colour:
+def oren_nayar_full(wi: Direction, wo: Direction, albedo: Colour, sigma: Scalar) -> Colour:
     """Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection."""
     sigma2 = sigma * sigma
     c1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33)
     c2 = 0.45 * sigma2 / (sigma2 + 0.09)
     c3 = 0.125 * sigma2 / (sigma2 + 0.09)
     c4 = 0.17 * sigma2 / (sigma2 + 0.13)
-    sin_i = safe_sqrt(wi[0] * wi[0] + wi[1] * wi[1])
-    sin_o = safe_sqrt(wo[0] * wo[0] + wo[1] * wo[1])
+    sin_i = safe_sqrt(sine2(wi))
+    sin_o = safe_sqrt(sine2(wo))
     # Elevations rather than polar angles, and 1 - cos rather than cos: near grazing, differences of ones stand over small cosines.
-    elevation_i = jnp.arctan2(wi[2], sin_i) * (2.0 / jnp.pi)
-    elevation_o = jnp.arctan2(wo[2], sin_o) * (2.0 / jnp.pi)
+    elevation_i = jnp.arctan2(wi[-1], sin_i) * (2.0 / jnp.pi)
+    elevation_o = jnp.arctan2(wo[-1], sin_o) * (2.0 / jnp.pi)
     higher = jnp.maximum(elevation_i, elevation_o)
-    lower_cos = jnp.minimum(wi[2], wo[2])
-    larger_cos = jnp.maximum(wi[2], wo[2])
+    lower_cos = jnp.minimum(wi[-1], wo[-1])
+    larger_cos = jnp.maximum(wi[-1], wo[-1])
     larger_sin = jnp.maximum(sin_i, sin_o)
-    dot_xy = wi[0] * wo[0] + wi[1] * wo[1]
+    dot_xy = dot(along(wi), along(wo))
     cos_phi = safe_divide(dot_xy, sin_i * sin_o)
-    sin_phi = safe_divide(wi[0] * wo[1] - wi[1] * wo[0], sin_i * sin_o)
-    aside = sin_phi * sin_phi / (1.0 + jnp.abs(cos_phi))  # 1 - |cos phi|
+    azimuth_i, azimuth_o = safe_divide(along(wi), sin_i), safe_divide(along(wo), sin_o)
+    facing = dot_xy < 0.0
+    apart = azimuth_i + where(facing, azimuth_o, -azimuth_o)
+    aside = 0.5 * dot(apart, apart)  # 1 - |cos phi|
     # tan of the smaller polar angle has the larger cosine below it; tan of the mean angle is (sin + sin) / (cos + cos).
     forward = dot_xy / larger_cos
     gap = higher * (3.0 - higher * (3.0 - higher)) - lower_cos * lower_cos / (1.0 + larger_sin)
     backward = safe_divide(dot_xy * gap, larger_cos * larger_sin)
-    tan_mean = (sin_i + sin_o) / (wi[2] + wo[2])
+    tan_mean = (sin_i + sin_o) / (wi[-1] + wo[-1])
     smaller = 1.0 - higher
     product = smaller * (1.0 - jnp.minimum(elevation_i, elevation_o))
     direct = c1 + c2 * where(dot_xy >= 0.0, forward, backward)
@@ -113,7 +116,7 @@ class OrenNayar(Diffuse):
     )
     form: str = choice(default="full", others=("qualitative",), doc="with one interreflection, or the short form")
 
-    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+    def evaluate(self, wi: Direction, wo: Direction) -> Colour:
         """BRDF [1/sr]."""
         chosen = oren_nayar_full if self.form == "full" else oren_nayar_qualitative
         return chosen(wi, wo, self.albedo, self.sigma)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from .._chunk import static, where
 from .._fields import choice, layer, param
 from .._place import TANGENT, Place
-from .._types import Colour, Number, Scalar, Vec2, Vec3
+from .._types import Colour, Direction, Number, Scalar, Vec2
 from ..optics.flakes import flake_tilt, half_into_facet, into_facet, kept_tilt, lost_variance, tilted_d, tilted_normal
 from ..optics.microfacet import Width, density, visibility
 from .base import Lobe, Surface, widened_variance
@@ -130,7 +130,7 @@ class FlakeLobe(Lobe):
         F = self.paint.reflectance(c)
         return F if self.paint.coverage is None else self.paint.coverage * F
 
-    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+    def shape(self, wi: Direction, wo: Direction, h: Direction, width: Width | None = None) -> Scalar:
         if self.flake is None:
             width = self.width if width is None else width
             return density("beckmann", h, width) * visibility("smith", "beckmann", wi, wo, width)
@@ -138,19 +138,21 @@ class FlakeLobe(Lobe):
             return self._in_its_frame(wi, wo, self.paint.alpha if width is None else width, self.flake)
         return self._among_others(wi, wo, h, self.width, None, self.flake)
 
-    def widened(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, added: Width) -> Scalar:
+    def widened(self, wi: Direction, wo: Direction, h: Direction, width: Width, added: Width) -> Scalar:
         if self.flake is None or self.paint.lost == "nothing":
             return self.shape(wi, wo, h, width)
         return self._among_others(wi, wo, h, width, added, self.flake)
 
-    def _among_others(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width, added: Width | None, flake: Flake) -> Scalar:
+    def _among_others(
+        self, wi: Direction, wo: Direction, h: Direction, width: Width, added: Width | None, flake: Flake
+    ) -> Scalar:
         """The lobe about a flake. Flakes hide one another by the slopes of all: the mean over flakes is the lobe seen from afar."""
         alpha, sigma = self.paint.alpha, self.paint.sigma
         # Of a flake alone, and what coats add: the width of all flakes, less their spread, would have the digits of that.
         alpha2 = widened_variance(alpha * alpha + flake.lost * (sigma * sigma), added)
         return tilted_d(h, flake.tilt, jnp.sqrt(alpha2)) * visibility("smith", "beckmann", wi, wo, width)
 
-    def _in_its_frame(self, wi: Vec3, wo: Vec3, width: Width, flake: Flake) -> Scalar:
+    def _in_its_frame(self, wi: Direction, wo: Direction, width: Width, flake: Flake) -> Scalar:
         """The lobe of a surface whose normal is that of the flake (Elek 2010): nothing where either direction is below it."""
         n = tilted_normal(flake.tilt)
         up = jnp.array([0.0, 0.0, 1.0], n.dtype)

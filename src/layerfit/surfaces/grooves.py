@@ -7,7 +7,8 @@ import jax.numpy as jnp
 
 from .._chunk import chunk, safe_sqrt, static
 from .._fields import choice, layer, param
-from .._types import Colour, Number, Scalar, Vec3
+from .._types import Colour, Direction, Number, Scalar
+from ..optics.directions import sine2
 from ..optics.microfacet import Distribution, Masking, Width, v_cavity
 from .base import Lobe, variance
 from .diffuse import TwoParts, kd_param
@@ -44,7 +45,7 @@ class CookTorrance(TwoParts, Metal, Microfacets):
         F = self.ks * super().reflectance(c)
         return F if self.scaling == "normalized" else F * (4.0 / math.pi)
 
-    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+    def evaluate(self, wi: Direction, wo: Direction) -> Colour:
         f = super().evaluate(wi, wo)
         return f if self.diffuse is None else f + self.diffuse.evaluate(wi, wo)
 
@@ -53,9 +54,9 @@ class CookTorrance(TwoParts, Metal, Microfacets):
 
 
 @chunk
-def torrance_sparrow_d(h: Vec3, kappa: Scalar) -> Scalar:
+def torrance_sparrow_d(h: Direction, kappa: Scalar) -> Scalar:
     """exp(-(kappa delta)^2), delta the angle between facet and surface (Torrance and Sparrow 1967)."""
-    delta = jnp.arctan2(safe_sqrt(h[0] * h[0] + h[1] * h[1]), h[2])
+    delta = jnp.arctan2(safe_sqrt(sine2(h)), h[-1])
     slope = kappa * delta
     return jnp.exp(-(slope * slope))
 
@@ -92,7 +93,7 @@ class TorranceSparrow(TwoParts, Metal, Lobe):
     def energy(self, reflectance: Colour) -> Colour:
         return jnp.minimum(reflectance * (math.pi / (self.kappa * self.kappa)), 1.0)
 
-    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+    def shape(self, wi: Direction, wo: Direction, h: Direction, width: Width | None = None) -> Scalar:
         V = v_cavity(wi, wo)
         if width is None:
             return torrance_sparrow_d(h, self.kappa) * V

@@ -4,33 +4,40 @@ import dataclasses
 import math
 from typing import Any, ClassVar
 
+import jax
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_sqrt, static, where
+from .._chunk import chunk, dot, safe_sqrt, static, where
 from .._fields import layer, param
-from .._types import Colour, Number, Scalar, Vec3
+from .._types import Colour, Direction, Number, Scalar, Vec3
 from ..optics.microfacet import Width
 from .base import Lobe, variance
 from .diffuse import TwoParts, kd_param
 
 
 @chunk
-def lafortune_log_product(wi: Vec3, wo: Vec3, C: Vec3) -> Scalar:
+def lafortune_log_product(wi: Direction, wo: Direction, C: Vec3) -> Scalar:
     """log(Cx wi.x wo.x + Cy wi.y wo.y + Cz wi.z wo.z), which is 0 at the peak of Phong's lobe; -1e4 where there is none."""
     # a b = (a^2 + b^2 - (a - b)^2) / 2, with signs, and unit vectors: the sum less 1 has its own digits near 0.
+    C = _as_many(C, wi)
     magnitude = jnp.abs(C)
     apart = wi - jnp.sign(C) * wo
     above_one = 0.5 * ((magnitude - 1.0) * (wi * wi + wo * wo) - magnitude * (apart * apart))
-    product = above_one[0] + above_one[1] + above_one[2]
+    product = jnp.sum(above_one)
     inside = product > -0.999999
     return where(inside, jnp.log1p(where(inside, product, 0.0)), -1e4)
 
 
 @chunk
-def lafortune_log_length(w: Vec3, C: Vec3) -> Scalar:
+def lafortune_log_length(w: Direction, C: Vec3) -> Scalar:
     """log of the length of (Cx w.x, Cy w.y, Cz w.z): the most that any direction makes of the product with w."""
-    x, y, z = C[0] * w[0], C[1] * w[1], C[2] * w[2]
-    return 0.5 * jnp.log(jnp.maximum(x * x + y * y + z * z, 1e-12))
+    weighted = _as_many(C, w) * w
+    return 0.5 * jnp.log(jnp.maximum(dot(weighted, weighted), 1e-12))
+
+
+def _as_many(C: Vec3, w: Direction) -> jax.Array:
+    """The weights of as many numbers as a direction has: without a frame there are three along the surface, all weighted alike."""
+    return C if len(w) == len(C) else jnp.concatenate([C[:1], C])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +61,7 @@ class LafortuneLobe(Lobe):
         peak = jnp.exp(jnp.minimum(self.exponent * jnp.log(jnp.maximum(jnp.abs(self.C[2]), 1e-6)), 20.0))
         return jnp.minimum(reflectance * peak * (2.0 * math.pi / (self.exponent + 2.0)), 1.0)
 
-    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+    def shape(self, wi: Direction, wo: Direction, h: Direction, width: Width | None = None) -> Scalar:
         """The power of the product; of a widened lobe, a lower power with the same light and the same scale."""
         log_product = lafortune_log_product(wi, wo, self.C)
         if width is None:

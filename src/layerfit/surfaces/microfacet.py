@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from .._chunk import chunk, static
 from .._fields import choice, layer, param
-from .._types import Colour, Number, Scalar, Vec3
+from .._types import Colour, Direction, Number, Scalar
 from ..optics.microfacet import Distribution, Masking, Width, density, half_cosine, half_vector, visibility
 from .base import Lobe, Surface
 from .facet import Clear, Fresnel, Metal, fresnel_choice, lazanyi_a, lazanyi_alpha, metal_eta, metal_k
@@ -31,21 +31,21 @@ class Microfacets(Surface, Lobe):
     def lobes(self) -> tuple[Lobe, ...]:
         return (self,)
 
-    def density(self, h: Vec3, width: Width | None = None) -> Scalar:
+    def density(self, h: Direction, width: Width | None = None) -> Scalar:
         """D(h) [1/sr] of these facets, or of wider ones."""
         return density(self.distribution, h, self.width if width is None else width)
 
-    def visibility(self, wi: Vec3, wo: Vec3, width: Width | None = None) -> Scalar:
+    def visibility(self, wi: Direction, wo: Direction, width: Width | None = None) -> Scalar:
         """G / (4 NoL NoV) of these facets, or of wider ones."""
         return visibility(self.masking, self.distribution, wi, wo, self.width if width is None else width)
 
-    def shape(self, wi: Vec3, wo: Vec3, h: Vec3, width: Width | None = None) -> Scalar:
+    def shape(self, wi: Direction, wo: Direction, h: Direction, width: Width | None = None) -> Scalar:
         """D V."""
         D = self.density(h, width)
         V = self.visibility(wi, wo, width)
         return D * V
 
-    def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
+    def evaluate(self, wi: Direction, wo: Direction) -> Colour:
         """F D V [1/sr] of directions above the surface (Cook and Torrance 1982; Walter et al. 2007, eq. 20)."""
         F = self.reflectance(half_cosine(wi, wo))
         D = self.density(half_vector(wi, wo))

@@ -1,0 +1,42 @@
+"""Directions: the part along the surface first, the cosine to its normal last.
+
+In the frame of the surface the part along it has two numbers. What turns about the normal without a change needs no frame: there, the
+part along the surface may be given in any space, by three numbers. Formulas here hold for both, so that they print with or without one.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .._chunk import dot, where
+from .._types import Direction, Flag, Scalar
+
+
+def along(w: Direction) -> jax.Array:
+    """The part along the surface."""
+    return w[:-1]
+
+
+def sine2(w: Direction) -> Scalar:
+    """Squared sine to the normal."""
+    part = along(w)
+    return dot(part, part)
+
+
+def direction(part: jax.Array, cosine: Scalar) -> Direction:
+    """A direction of its part along the surface and its cosine."""
+    return jnp.concatenate([part, cosine[None]])
+
+
+def both_above(wi: Direction, wo: Direction) -> Flag:
+    """Whether both are above the surface."""
+    return jnp.minimum(wi[-1], wo[-1]) > 0.0
+
+
+@jax.jit
+def above(lit: Flag, w: Direction) -> Direction:
+    """A direction where it is `lit`, else the normal: a guard of derivatives, for values that are then not used.
+
+    In a shader it is the direction itself, and what comes of one below the surface is not chosen.
+    """
+    return where(lit, w, jnp.asarray(np.eye(len(w))[-1], w.dtype))
