@@ -10,6 +10,7 @@ from helpers import COPPER, STACKS, needs_tools
 from layerfit._directions import random_pairs
 from layerfit.errors import InputError
 from layerfit.forms.corrected import Corrected
+from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
 from layerfit.render import brdf, brdf_values
@@ -30,11 +31,21 @@ MATERIALS = {
     "precise, metal": (Stack((LACQUER,), METAL, Precise()), 1e-4),
     "corrected, diffuse": (Stack((LACQUER,), PAPER, Corrected()), 1e-4),
     "precise, diffuse": (Stack((LACQUER,), PAPER, Precise()), 1e-3),
+    "faithful, metal": (Stack((LACQUER,), METAL, Faithful()), 1e-4),
+    "faithful, diffuse": (Stack((LACQUER,), PAPER, Faithful()), 1e-4),
+    "faithful, clear and grey": (Stack((Coat(alpha=0.2, eta=1.4),), Conductor(alpha=0.3, eta=0.2, k=3.5), Faithful()), 1e-4),
     "corrected, clear and grey": (Stack((Coat(alpha=0.2, eta=1.4),), Conductor(alpha=0.3, eta=0.2, k=3.5), Corrected()), 1e-4),
     "precise, clear and grey": (Stack((Coat(alpha=0.2, eta=1.4),), Conductor(alpha=0.3, eta=0.2, k=3.5), Precise()), 1e-3),
 }
 
-INSTRUCTIONS = {"corrected, metal": 210, "precise, metal": 340, "corrected, diffuse": 100, "precise, diffuse": 118}
+INSTRUCTIONS = {
+    "faithful, metal": 106,
+    "faithful, diffuse": 90,
+    "corrected, metal": 206,
+    "corrected, diffuse": 100,
+    "precise, metal": 330,
+    "precise, diffuse": 112,
+}
 """At most, of the whole fragment shader with one light, after spirv-opt -O; Phong has 27."""
 
 ROUNDING = 2e-5
@@ -79,6 +90,44 @@ def test_how_many_instructions(made, name):
     assert 2 * 27 < instructions(print_material(made[name].stack, "test")).total <= INSTRUCTIONS[name]
 
 
+@pytest.fixture(scope="module")
+def paper():
+    """Tables of the faithful form, as few entries as take 2e-3."""
+    return make_tier(MATERIALS["faithful, metal"][0], "tables", 2e-3)
+
+
+def test_tables_are_as_small_as_the_error_allows(paper):
+    stack = MATERIALS["faithful, metal"][0]
+    assert paper.table_bytes == 4 * 5 * 64
+    assert 1e-4 < paper.error <= 2e-3
+    finer = make_tier(stack, "tables", entries=128)
+    assert finer.table_bytes == 2 * paper.table_bytes
+    # Linear interpolation: half as far apart, four times as near.
+    assert finer.error == pytest.approx(paper.error / 4.0, rel=0.3)
+    assert make_tier(stack, "tables").table_bytes == 4 * 5 * 256
+
+
+def test_the_shader_of_tables(gl, paper):
+    shader = print_material(paper.stack, "test")
+    parity = check_pairs(shader, 16384)
+    assert parity.passed, parity
+    assert "const vec4 lf_row1[64] = vec4[64](" in shader.text("essl300")
+    assert "Tables of 64 entries, 1.3 kB" in shader.text()
+    stack, (wi, wo) = MATERIALS["faithful, metal"][0], random_pairs(8192, seed=7)
+    exact = brdf_values(stack, wi, wo)
+    error = np.abs(brdf_values(paper.stack, wi, wo) - exact) / np.maximum(np.abs(exact), 1e-4 / np.pi)
+    assert 0.3 * paper.error < error.max() <= 1.2 * paper.error
+
+
+def test_tables_that_there_are_not():
+    with pytest.raises(InputError, match="is diffuse"):
+        make_tier(MATERIALS["faithful, diffuse"][0], "tables")
+    with pytest.raises(InputError, match="stays at"):
+        make_tier(MATERIALS["corrected, metal"][0], "tables", 1e-3)
+    with pytest.raises(InputError, match="2 to 4096"):
+        make_tier(MATERIALS["faithful, metal"][0], "tables", entries=1)
+
+
 def test_degrees_are_as_low_as_the_error_allows(made):
     stack, asked = MATERIALS["corrected, metal"]
     coarse = make_tier(stack, "compact", 30.0 * asked)
@@ -93,7 +142,8 @@ def test_degrees_are_as_low_as_the_error_allows(made):
     [
         (STACKS["corrected, anisotropic"], "not isotropic GGX"),
         (STACKS["corrected, three layers"], "one coat"),
-        (STACKS["faithful over conductor"], "the corrected and the precise form"),
+        (Stack((LACQUER,), METAL, Faithful(refract_at="n")), "the faithful form as published"),
+        (Stack((LACQUER,), OrenNayar(), Faithful()), "not the same from all sides"),
         (Stack((LACQUER,), OrenNayar(), Corrected()), "its error stays at"),
     ],
 )

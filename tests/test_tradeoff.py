@@ -20,7 +20,8 @@ from layerfit.stack import Stack
 from layerfit.study import fits, shaders
 from layerfit.study.errors import relative, seen
 from layerfit.study.kept import Kept
-from layerfit.study.variants import EXACT, variants
+from layerfit.study.shaders import shaders_of, table_bytes
+from layerfit.study.variants import EXACT, TABLE_ENTRIES, variants
 from layerfit.surfaces import Conductor, Dielectric, Lambert
 from layerfit.tradeoffs import FILES, PARTS, against_walk
 
@@ -51,7 +52,10 @@ def test_ways_of_a_coated_metal():
     """Of each form, and with reflectances that are not exact."""
     stack = Stack((varnish(),), Conductor(alpha=0.2, eta=[0.2, 0.9, 1.1], k=[3.9, 2.5, 2.1]), Corrected(orders=2))
     found = variants(stack)
-    assert list(found) == [EXACT, "precise", "faithful", "corrected, 0 orders", "corrected, 1 order", "schlick", "lazanyi"]
+    orders = ["corrected, 0 orders", "corrected, 1 order"]
+    tables = [f"tables, {entries}" for entries in TABLE_ENTRIES]
+    assert list(found) == [EXACT, "precise", "faithful", "faithful, compact", *orders, *tables, "schlick", "lazanyi"]
+    assert [table_bytes(shader) for shader in shaders_of({n: found[n] for n in tables}).values()] == [320, 1280, 5120, 20480]
     assert found[EXACT] is stack
     assert isinstance(found["precise"].form, Precise)
     assert [layer.fresnel for layer in (*found["schlick"].layers, found["schlick"].base)] == ["schlick"] * 2

@@ -19,13 +19,16 @@ def export(
     ] = False,
     tier: Annotated[
         str | None,
-        typer.Option(help="exact (the default), compact, lazanyi, schlick or faithful.", autocompletion=complete.tiers),
+        typer.Option(help="exact (the default), compact, lazanyi, schlick, faithful or tables.", autocompletion=complete.tiers),
     ] = None,
     max_error: Annotated[
         float | None, typer.Option(help="Relative error against the exact form that is allowed: takes the cheapest tier.")
     ] = None,
     max_cost: Annotated[
         float | None, typer.Option(help="Instructions in times of Phong: takes the nearest tier within.")
+    ] = None,
+    entries: Annotated[
+        int | None, typer.Option(help="Of the tables of --tier tables; left out, as many as --max-error takes, or 256.")
     ] = None,
     to: Annotated[
         str | None,
@@ -51,8 +54,10 @@ def export(
     from ..errors import InputError
 
     if to is not None:
-        if uniforms or any(option is not None for option in (tier, max_error, max_cost)):
-            raise InputError("--uniforms, --tier, --max-error and --max-cost are of the shader: leave them out, or --to")
+        if uniforms or any(option is not None for option in (tier, max_error, max_cost, entries)):
+            raise InputError(
+                "--uniforms, --tier, --max-error, --max-cost and --entries are of the shader: leave them out, or --to"
+            )
         return _export_to(preset, to, scene, output)
     if scene is not None:
         raise InputError("--scene is for --to: a shader is the material, wherever it is seen")
@@ -63,10 +68,12 @@ def export(
         raise InputError(f"--target {target}: should be one of {', '.join(HEADERS)}{nearest(target, HEADERS)}")
     stack = read_preset(preset)
     asked = tier is not None or max_error is not None or max_cost is not None
+    if entries is not None and tier != "tables":
+        raise InputError("--entries is for --tier tables, which alone has tables")
     if uniforms and asked:
         raise InputError("--uniforms goes with the exact form alone: leave out --tier, --max-error and --max-cost")
     if asked:
-        shader, name, told = _tier(stack, preset.stem, tier, max_error, max_cost)
+        shader, name, told = _tier(stack, preset.stem, tier, max_error, max_cost, entries)
         say(told)
     else:
         shader, name = print_material(stack, preset.stem, uniforms), "exact"
@@ -104,7 +111,7 @@ def _write(text: str, output: Path | None) -> None:
         say(f"Wrote {output}")
 
 
-def _tier(stack: Any, name: str, tier: str | None, max_error: float | None, max_cost: float | None) -> Any:
+def _tier(stack: Any, name: str, tier: str | None, max_error: float | None, max_cost: float | None, entries: int | None) -> Any:
     """The shader of the tier that is asked for, its name, and what is said of it."""
     from ..errors import InputError
     from ..shader.choose import choose_tier
@@ -116,8 +123,11 @@ def _tier(stack: Any, name: str, tier: str | None, max_error: float | None, max_
         return choice.shader, choice.tier.name, str(choice)
     if max_cost is not None:
         raise InputError("--max-cost chooses a tier: leave out --tier")
-    made = make_tier(stack, cast(Any, tier), max_error)
-    return print_material(made.stack, name), made.name, f"{made.name}: within {made.error:.1e} of the exact form"
+    made = make_tier(stack, cast(Any, tier), max_error, entries)
+    told = f"{made.name}: within {made.error:.1e} of the exact form"
+    if made.table_bytes:
+        told += f", with tables of {made.table_bytes / 1000:.1f} kB"
+    return print_material(made.stack, name), made.name, told
 
 
 @command()

@@ -71,8 +71,8 @@ def of_phong() -> dict[str, int]:
 
 
 def table_bytes(shader: Shader) -> int:
-    """Of what a host has to upload as tables."""
-    return sum(np.asarray(value).nbytes for value in shader.uniforms.values() if np.ndim(value) > 1)
+    """Of the tables that stand in a shader."""
+    return getattr(shader.stack.base, "table_bytes", 0)
 
 
 def timed(timing: Timing) -> dict[str, Any]:

@@ -3,14 +3,18 @@
 import dataclasses
 
 from ..forms.corrected import Corrected
+from ..forms.precise import Precise
 from ..preset import MODELS, model_name
 from ..shader.export import print_material
 from ..stack import FORMS, IN_TIME, Stack
-from ..tiers.compact import compact
+from ..tiers.compact import compact, tables
 from ..tiers.fresnel import with_fresnel
 
 EXACT = "exact"
 """The material as its preset says: its own form, exact reflectances."""
+
+TABLE_ENTRIES = (16, 64, 256, 1024)
+"""Resolutions of the tables."""
 
 COMPACT_ERRORS = (1e-2, 1e-3, 1e-4)
 """That the compact tier is held to."""
@@ -18,7 +22,8 @@ COMPACT_ERRORS = (1e-2, 1e-3, 1e-4)
 
 def variants(stack: Stack) -> dict[str, Stack]:
     """Every way by its name, the material itself first. What prints the same shader is listed once."""
-    ways = {EXACT: stack, **_compact(stack), **_forms(stack), **_fewer_orders(stack)}
+    forms = _forms(stack)
+    ways = {EXACT: stack, **_compact(stack), **forms, **_compact_forms(forms), **_fewer_orders(stack), **_tables(stack)}
     ways |= {kind: approximate for kind in ("schlick", "lazanyi") if (approximate := with_fresnel(stack, kind)) is not None}
     seen: dict[str, str] = {}
     for name, way in ways.items():
@@ -42,6 +47,18 @@ def _fewer_orders(stack: Stack) -> dict[str, Stack]:
     form = stack.form if isinstance(stack.form, Corrected) else Corrected()
     some = {f"corrected, {n} order{'' if n == 1 else 's'}": n for n in range(form.orders)}
     return {name: dataclasses.replace(stack, form=dataclasses.replace(form, orders=n)) for name, n in some.items()}
+
+
+def _compact_forms(forms: dict[str, Stack]) -> dict[str, Stack]:
+    """The same of the other forms, near enough that only the form tells; not of the precise one, which is taken for its accuracy."""
+    made = {name: compact(way, COMPACT_ERRORS[-1]) for name, way in forms.items() if not isinstance(way.form, Precise)}
+    return {f"{name}, compact": found[0] for name, found in made.items() if not isinstance(found, str)}
+
+
+def _tables(stack: Stack) -> dict[str, Stack]:
+    """The paper's precomputed form, at several resolutions."""
+    made = {f"tables, {entries}": tables(stack, entries=entries) for entries in TABLE_ENTRIES}
+    return {name: found[0] for name, found in made.items() if not isinstance(found, str)}
 
 
 def _compact(stack: Stack) -> dict[str, Stack]:

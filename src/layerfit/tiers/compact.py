@@ -6,6 +6,7 @@ cosine, and a width in a sum of widths. Degrees are lowered one by one while the
 """
 
 import dataclasses
+from dataclasses import replace
 from typing import Any
 
 import jax
@@ -14,11 +15,13 @@ import numpy as np
 
 from .._directions import FLOOR as OF_WHITE, random_pairs
 from ..forms.corrected import Corrected
+from ..forms.faithful import Faithful
 from ..forms.precise import Precise
 from ..render import brdf
 from ..stack import Stack, evaluate
+from ..surfaces.diffuse import Lambert
 from ..surfaces.microfacet import Conductor
-from . import corrected_metal, diffuse, precise_metal
+from . import corrected_metal, diffuse, faithful, precise_metal, tables as precomputed
 from .polynomial import MOST
 from .surface import Compact, Recipe, noted, plain
 
@@ -39,14 +42,15 @@ def refuses(stack: Stack) -> str | None:
     if len(stack.layers) != 1:
         return "it is made for one coat"
     coat, base, form = stack.layers[0], stack.base, stack.form
-    if not isinstance(form, (Corrected, Precise)):
-        return "it is made for the corrected and the precise form"
+    if isinstance(form, Faithful) and form != Faithful():
+        return "it is made for the faithful form as published"
     if not plain(coat):
         return f"{coat.name} is not isotropic GGX with the exact reflectance, Smith's masking and no film"
     if coat.tau_s is not None:
         return f"{coat.name} scatters light"
     if not base.lobes:
-        return None
+        lambertian = isinstance(base.diffuse, Lambert) or not isinstance(form, Faithful)
+        return None if lambertian else f"{base.name} is not the same from all sides"
     if (
         not isinstance(base, Conductor)
         or isinstance(base.width, tuple)
@@ -64,6 +68,33 @@ def compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
         return reason
     with jax.enable_x64(True):
         return _compact(stack.astype(np.float64), max_error)
+
+
+def tables(stack: Stack, max_error: float | None = None, entries: int | None = None) -> tuple[Stack, float] | str:
+    """A material whose reflectances and densities are read from tables, and its largest relative error against `stack`; or why there is none.
+
+    It is of the faithful form. Without `entries` the tables have as few, a power of 2, as a `max_error` takes, or 256.
+    """
+    paper = replace(stack, form=Faithful()) if stack.layers else stack
+    if reason := refuses(paper):
+        return reason
+    if not paper.base.lobes:
+        return f"{paper.base.name} is diffuse, and over it there is nothing to look up but the coat's top"
+    with jax.enable_x64(True):
+        prepared, judge = paper.astype(np.float64).prepare(), _Judge(stack.astype(np.float64), 2)
+        for count in _doubled() if max_error is not None and entries is None else [entries or precomputed.ENTRIES]:
+            base = precomputed.made(prepared, stack.base.name, count)
+            error = judge.error(base)
+            if max_error is None or error <= max_error:
+                size = f"{count} entries, {base.table_bytes / 1000:.1f} kB"
+                note = f"Tables of {size}, of the faithful form: within {error:.1e} of the exact one, relative, over random and extreme directions."
+                return replace(stack, layers=(), base=noted(base, note)).astype(np.float32), error
+    return f"its error stays at {error:.1e}, and {max_error:.1e} is asked for"
+
+
+def _doubled() -> list[int]:
+    """Numbers of entries that are tried."""
+    return [2**k for k in range(precomputed.FEWEST.bit_length() - 1, precomputed.MOST.bit_length())]
 
 
 def largest_error(other: Stack, stack: Stack) -> float:
@@ -97,6 +128,8 @@ def _compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
 
 def _recipe(stack: Stack) -> Recipe:
     prepared, name = stack.prepare(), stack.base.name
+    if isinstance(stack.form, Faithful):
+        return faithful.recipe(prepared, name)
     if not stack.base.lobes:
         return diffuse.recipe(prepared, name, lambda prepared, wi, wo: evaluate(stack.form, prepared, wi, wo))
     return precise_metal.recipe(prepared, name) if isinstance(stack.form, Precise) else corrected_metal.recipe(prepared, name)

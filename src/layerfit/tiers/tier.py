@@ -8,13 +8,17 @@ from ..documents import nearest
 from ..errors import InputError
 from ..forms.faithful import Faithful
 from ..stack import Stack
-from .compact import compact, largest_error
+from .compact import compact, largest_error, tables
 from .fresnel import with_fresnel
 
-Name = Literal["exact", "compact", "lazanyi", "schlick", "faithful"]
+Name = Literal["exact", "compact", "lazanyi", "schlick", "faithful", "tables"]
 TIERS: tuple[Name, ...] = get_args(Name)
 """`exact`: the material's own form. `compact`: polynomials for what lies under the coat, fitted to it. `lazanyi` and `schlick`: short
-formulas for what a facet reflects. `faithful`: the form of Weidlich and Wilkie 2007. (Truth is the random walk, which no shader does.)"""
+formulas for what a facet reflects. `faithful`: the form of Weidlich and Wilkie 2007. `tables`: that form with reflectances and densities read
+from tables, as Elek 2010. (Truth is the random walk, which no shader does.)"""
+
+MOST_ENTRIES = 4096
+"""Of a table: more would only be longer."""
 
 MAX_ERROR = 1e-4
 """Relative error that `compact` is held to where none is asked for."""
@@ -31,9 +35,16 @@ class Tier:
     """Largest relative difference of its BRDF from the exact form's, over random and extreme pairs of directions; values below 1e-4 of
     a white diffuse surface are compared absolutely."""
 
+    @property
+    def table_bytes(self) -> int:
+        """Bytes of the tables that stand in its shader."""
+        return getattr(self.stack.base, "table_bytes", 0)
 
-def make_tier(stack: Stack, name: Name = "compact", max_error: float | None = None) -> Tier:
+
+def make_tier(stack: Stack, name: Name = "compact", max_error: float | None = None, entries: int | None = None) -> Tier:
     """A tier of a material; `compact` has degrees as low as `max_error` allows (1e-4).
+
+    `tables` have so many `entries`, 2 to 4096; left out, as few as `max_error` allows, or 256.
 
     Raises `InputError` where the material has no such tier, or none within `max_error`.
     """
@@ -46,6 +57,13 @@ def make_tier(stack: Stack, name: Name = "compact", max_error: float | None = No
         if isinstance(made, str):
             raise InputError(f"there is no compact tier of this material: {made}. Print it exactly (tier exact)")
         return Tier(name, *made)
+    if name == "tables":
+        if entries is not None and not 2 <= entries <= MOST_ENTRIES:
+            raise InputError(f"tables of {entries} entries: should be 2 to {MOST_ENTRIES}")
+        found = tables(stack, max_error, entries)
+        if isinstance(found, str):
+            raise InputError(f"there is no tier tables of this material: {found}")
+        return Tier(name, *found)
     other = stack if name == "exact" else _other(stack, name)
     error = 0.0 if name == "exact" else largest_error(other, stack)
     if max_error is not None and error > max_error:
