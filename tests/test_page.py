@@ -18,7 +18,7 @@ from helpers import APPROXIMATE, STACKS
 from layerfit import view
 from layerfit.fit.metrics import display
 from layerfit.preset import read_preset, stack_of
-from layerfit.report import pages
+from layerfit.report import gallery, pages
 from layerfit.report.comparison import Pair
 from layerfit.report.gallery import for_web
 from layerfit.report.html import page as report_page
@@ -193,6 +193,26 @@ def test_a_view_comes_back_after_its_driver(browser, tmp_path):
     page.evaluate("driver.restoreContext()")
     until(page, f"layerfit.views[0].age > 1 && {drawn}")
     assert page.locator(".stage canvas").screenshot() == first
+    page.close()
+    assert not faults
+
+
+def test_a_shader_that_a_driver_refuses_is_said_in_its_place(browser, tmp_path):
+    """And the others are drawn."""
+    path = tmp_path / "gallery.html"
+    path.write_text(gallery.page(shipped_presets("concrete")))
+    page = browser.new_page(viewport={"width": 500, "height": 500})
+    faults = []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.goto(path.as_uri())
+    until(page, "globalThis.layerfit?.ready")
+    page.evaluate(small("40px"))
+    page.evaluate("layerfit.views[1].fragment = layerfit.views[1].fragment.replace('void main()', 'void main(')")
+    page.locator(".tile canvas").nth(1).focus()
+    until(page, "layerfit.views[1].failed && layerfit.views[0].passes > 0")
+    said = page.locator(".tile .said")
+    assert said.count() == 1
+    assert said.inner_text().startswith("There is no live view here: ERROR: ")
     page.close()
     assert not faults
 
