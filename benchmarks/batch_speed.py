@@ -129,9 +129,9 @@ def main() -> None:
                 quick=arguments.quick,
                 progress=lambda done, failed, total: times.append((done + failed, time.perf_counter())),
             )
+        rows = list(batch.rows)
         busy = busy_with(scenes[:GROUP]) if arguments.quick else {}
         seconds = scipy_seconds(folder)
-    rows = batch.rows
     off = [
         abs(row[key] / truth[key] - 1.0) for row, truth in zip(rows, truths, strict=True) for key in ("coat.alpha", "coat.eta")
     ]
