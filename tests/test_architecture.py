@@ -47,7 +47,7 @@ TOP = [
     {"report"},
     {"tabulate", "drawings", "job", "truth", "structures", "stability", "cache", "view", "doctor", "plot"},
     {"batch", "tradeoffs", "specialising", "notebook"},
-    {"maps"},
+    {"maps", "study.sweep"},
     {"demo"},
     {""},
     {"cli"},
@@ -66,6 +66,7 @@ GATES = {
     "MaterialX": "interchange.materialx",  # an extra
     "anywidget": "notebook.widget",  # an extra
     "matplotlib": "plot",  # an extra
+    "xarray": "study.sweep",  # an extra
     "traitlets": "notebook.widget",
     "distributed": "batch.cluster",  # an extra
     "typer": "cli",
@@ -116,13 +117,19 @@ def within(name: str, part: str) -> bool:
 
 
 def place(name: str) -> tuple[int, int, int]:
-    """(storey, branch, step) of a module."""
-    for storey, ladders in enumerate(([LADDER], BRANCHES, [TOP])):
-        for branch, ladder in enumerate(ladders):
-            for step, parts in enumerate(ladder):
-                if any(within(name, part) for part in parts):
-                    return storey, branch, step
-    return pytest.fail(f"{name} has no place yet: add it to LADDER, BRANCHES or TOP")
+    """(storey, branch, step) of a module: that of the longest name that it is within."""
+    found = [
+        (len(part), storey, branch, step)
+        for storey, ladders in enumerate(([LADDER], BRANCHES, [TOP]))
+        for branch, ladder in enumerate(ladders)
+        for step, parts in enumerate(ladder)
+        for part in parts
+        if within(name, part)
+    ]
+    if not found:
+        pytest.fail(f"{name} has no place yet: add it to LADDER, BRANCHES or TOP")
+    _, storey, branch, step = max(found)
+    return storey, branch, step
 
 
 def may_import(name: str, other: str) -> bool:

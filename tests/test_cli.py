@@ -29,6 +29,7 @@ COMMANDS = (
     "batch",
     "advise",
     "map",
+    "study",
     "render",
     "eval",
     "export",

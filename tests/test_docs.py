@@ -23,6 +23,7 @@ from layerfit.forms.precise import Precise
 from layerfit.layers import LAYERS
 from layerfit.preset import read_preset
 from layerfit.shipped import shipped_presets
+from layerfit.study.sweep import read_plan
 from layerfit.surfaces import BASES
 
 REPOSITORY = Path(__file__).parents[1]
@@ -165,9 +166,13 @@ WHOLE = {
 
 
 @pytest.mark.parametrize("text", blocks("toml"))
-def test_scenes_are_read(text, tmp_path):
+def test_scenes_and_plans_are_read(text, tmp_path):
+    document = tomllib.loads(text)
+    if "study" in document:
+        assert read_plan(document).points
+        return
     path = tmp_path / "scene.json"
-    path.write_text(json.dumps(WHOLE | tomllib.loads(text)))
+    path.write_text(json.dumps(WHOLE | document))
     assert read_scene(path).references
 
 

@@ -16,7 +16,7 @@ from mkdocs.structure.files import File, Files
 
 REPOSITORY = Path(__file__).parents[1]
 PUBLIC = REPOSITORY / "src" / "layerfit" / "__init__.pyi"
-NOTEBOOKS = sorted((REPOSITORY / "examples").glob("*.ipynb"))
+NOTEBOOKS = sorted((REPOSITORY / "examples").rglob("*.ipynb"))
 BESIDE = ("shaders/presets/*.*", "shaders/README.md", "examples/references/README.md", "CONTRIBUTING.md")
 """Files outside docs/ that pages link to."""
 
@@ -29,7 +29,7 @@ def on_files(files: Files, config: Any) -> Files:
         "commands.md": commands(),
         "python.md": python(PUBLIC.read_text()),
     }
-    made |= {f"examples/{path.stem}.md": notebook(path) for path in NOTEBOOKS}
+    made |= {path.relative_to(REPOSITORY).with_suffix(".md").as_posix(): notebook(path) for path in NOTEBOOKS}
     for name, text in made.items():
         files.append(File.generated(config, name, content=text))
     for pattern in BESIDE:
@@ -51,9 +51,8 @@ def notebook(path: Path) -> str:
         "".join(cell["source"]) if cell["cell_type"] == "markdown" else f"```python\n{''.join(cell['source'])}\n```"
         for cell in cells
     ]
-    where = (
-        f"This page is the notebook `examples/{path.name}`: run it in Jupyter or VS Code, where its figures and sliders show."
-    )
+    name = path.relative_to(REPOSITORY).as_posix()
+    where = f"This page is the notebook `{name}`: run it in Jupyter or VS Code, where its figures and sliders show."
     return "\n\n".join([parts[0], where, *parts[1:]])
 
 

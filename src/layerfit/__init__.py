@@ -18,6 +18,7 @@
 - Shaders: print_material gives a Shader; shade_samples draws it; check_pairs and check_image compare it with JAX and give a Parity.
 - Other programs: export_to writes their material, an Export with what is lost; read_start gives the layers of one of theirs.
 - Error against run time: tradeoff does what `layerfit tradeoff` does, specialise leaves out what a scene does not need.
+- Studies: study does what `layerfit study` does, trials of a material by a design, as an xarray Dataset; plot_study draws it.
 - Notebooks: live shows a material with sliders, both ways. plot_plane, plot_convergence and plot_tradeoff draw into axes of matplotlib.
 - Tiers: make_tier gives another way to print a material, a Tier; choose_tier the cheapest that is near enough, a Choice.
 - The machine: use_compilation_cache. Faults: InputError and MachineError, each a LayerfitError.

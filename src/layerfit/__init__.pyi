@@ -35,7 +35,12 @@ from .notebook import live as live
 from .optics.lazanyi import Lazanyi as Lazanyi, fit_lazanyi as fit_lazanyi
 from .optics.metals import Metal as Metal, metal as metal
 from .optics.spectra import Absorption as Absorption, absorption_rgb as absorption_rgb
-from .plot import plot_convergence as plot_convergence, plot_plane as plot_plane, plot_tradeoff as plot_tradeoff
+from .plot import (
+    plot_convergence as plot_convergence,
+    plot_plane as plot_plane,
+    plot_study as plot_study,
+    plot_tradeoff as plot_tradeoff,
+)
 from .preset import read_preset as read_preset, write_preset as write_preset
 from .render import brdf as brdf, predict as predict, radiance as radiance
 from .shader.choose import Choice as Choice, choose_tier as choose_tier
@@ -50,6 +55,7 @@ from .shipped import Shipped as Shipped, shipped_presets as shipped_presets
 from .specialising import specialise as specialise
 from .stack import Stack as Stack
 from .structures import structures_of as structures_of
+from .study.sweep import study as study
 from .surfaces import (
     Blinn as Blinn,
     CarPaint as CarPaint,

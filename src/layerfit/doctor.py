@@ -22,6 +22,8 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "interchange": (("MaterialX",), "exported .mtlx files validated, and compiled to GLSL"),
     "notebook": (("anywidget",), "materials live in a notebook, with sliders (`lf.live`)"),
     "digits": (("mpmath",), "what a value should be, to fifty digits (`layerfit stability`)"),
+    "cluster": (("distributed",), "a batch on a cluster of dask (`layerfit batch --scheduler`)"),
+    "study": (("xarray",), "what a study finds as a labelled array (`layerfit study`)"),
     "plot": (("matplotlib",), "curves and figures in notebooks"),
 }
 """Extras of the package: the packages that each brings, and what these give."""

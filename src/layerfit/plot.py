@@ -1,10 +1,11 @@
 """Figures for notebooks. Each draws into the axes that it is given, or into new ones, and returns them. The only file with matplotlib."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .documents import nearest
 from .errors import InputError, MachineError
 from .fit.result import FitResult
 from .render import brdf_values
@@ -78,6 +79,74 @@ def plot_tradeoff(document: Mapping[str, Any], against: str = "exact", *, ax: "A
     best = sorted(points[name] for name in front(document["tiers"], against) if name in points)
     ax.plot(*zip(*best, strict=True), color="C1", linewidth=1.0)
     ax.set(xlabel="time, in times of Phong", ylabel=f"relative error against the {against}", xscale="log", yscale="log")
+    return ax
+
+
+def plot_study(
+    dataset: Any,
+    variable: str = "error",
+    against: Sequence[str] = (),
+    parameter: str | None = None,
+    *,
+    ax: "Axes | None" = None,
+) -> "Axes":
+    """A variable of a `dataset` that `study` gave, `against` one factor (a profile: median and quartiles over all else), two of a grid (a heat map
+    of medians), or another variable such as "seconds" (points). Left out, the first two factors of a grid, or the first of another design.
+
+    `parameter` is the fitted entry that is meant, of a variable that has one for each; left out, the worst. Raises `InputError` for names that the
+    study does not have, and `MachineError` without the extra `plot`.
+    """
+    factors = str(dataset.attrs["factors"]).split()
+    against = tuple(against) or tuple(factors[: 2 if dataset.attrs["design"] == "grid" else 1])
+    known = [*map(str, dataset.data_vars), *factors]
+    if unknown := [name for name in (variable, *against) if name not in known]:
+        raise InputError(f"plot_study: the study has no {unknown[0]!r}{nearest(unknown[0], known)}; it has {', '.join(known)}")
+    values = dataset[variable]
+    if "parameter" in values.dims:
+        if parameter is not None and parameter not in values["parameter"]:
+            raise InputError(f"plot_study: {parameter!r} is not fitted; {', '.join(map(str, values['parameter'].values))} are")
+        values = values.max("parameter") if parameter is None else values.sel(parameter=parameter)
+    ax = _axes(ax)
+    named = f"{variable} of {parameter or 'the worst parameter'}" if "parameter" in dataset[variable].dims else variable
+    if len(against) == 2:
+        return _heat_map(values, against, named, ax)
+    (name,) = against
+    if name in factors:
+        return _profile(dataset, values, name, named, ax)
+    other = dataset[name].max("parameter") if "parameter" in dataset[name].dims else dataset[name]
+    ax.plot(np.ravel(other), np.ravel(values), ".")
+    ax.set(xlabel=name, ylabel=named, xscale="log", yscale="log")
+    return ax
+
+
+def _heat_map(values: Any, against: Sequence[str], named: str, ax: "Axes") -> "Axes":
+    x, y = against
+    table = values.median([d for d in values.dims if d not in against]).transpose(y, x)
+    image = ax.imshow(np.asarray(table), origin="lower", aspect="auto")
+    for name, axis in ((x, ax.xaxis), (y, ax.yaxis)):
+        axis.set_ticks(
+            range(table.sizes[name]), [f"{v:.3g}" if isinstance(v, float) else str(v) for v in table[name].values.tolist()]
+        )
+    ax.set(xlabel=x, ylabel=y)
+    bar: Any = ax.figure
+    bar.colorbar(image, ax=ax, label=named)
+    return ax
+
+
+def _profile(dataset: Any, values: Any, name: str, named: str, ax: "Axes") -> "Axes":
+    if name in values.dims:
+        rest = [d for d in values.dims if d != name]
+        low, middle, high = (np.asarray(values.quantile(q, rest)) for q in (0.25, 0.5, 0.75))
+        at = dataset[name].values
+        x = at if np.issubdtype(at.dtype, np.number) else np.arange(len(at))
+        ax.plot(x, middle, "o-")
+        ax.fill_between(x, low, high, alpha=0.25)
+        if x is not at:
+            ax.set_xticks(x, list(map(str, at)))
+    else:
+        rest = [d for d in values.dims if d != "point"]
+        ax.plot(dataset[name].values, np.asarray(values.median(rest)), ".")
+    ax.set(xlabel=name, ylabel=named)
     return ax
 
 

@@ -1,12 +1,14 @@
-"""Commands over many fits that are no list of scenes: `map`, a fit for every texel."""
+"""Commands over many fits that are no list of scenes: `map`, a fit for every texel, and `study`, trials by a design."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from ..documents import finite
+from . import complete
 from .app import Output, Scene, Starts, command
-from .talk import Done, progress, say
+from .talk import Done, many, progress, say
 
 
 @command("map")
@@ -77,3 +79,62 @@ def _lines(document: dict[str, Any]) -> list[str]:
             f"shader against JAX: max {parity['max_rel']:.1e}, p99.9 {parity['p999_rel']:.1e} relative, {parity['values']} values"
         )
     return lines
+
+
+@command()
+def study(
+    plan: Annotated[
+        Path, typer.Argument(help="Study file (TOML or JSON): material, design, what varies.", autocompletion=complete.files)
+    ],
+    output: Output = Path("out"),
+) -> Done:
+    """Vary a material, its reference or its fit by a design, and measure each point.
+
+    Leaves `study.nc` (xarray), `study.csv` and, with matplotlib, `study.png` in the output directory. What is interrupted goes on where it
+    was when the same command is given again. Exit code 1: some trials failed; `study.csv` says why.
+
+    Example: `layerfit study depth.toml -o out/depth`
+    """
+    from ..cache import use_compilation_cache
+
+    use_compilation_cache()
+    from ..study.sweep import study as run
+
+    with many() as report:
+        dataset = run(plan, output, progress=report)
+    failures = str(dataset.attrs["failures"]).splitlines()
+    for line in failures:
+        say(f"failed: {line}")
+    medians = {str(name): float(values.median()) for name, values in dataset.data_vars.items()}
+    for name, value in medians.items():
+        say(f"{name}: {value:.4g} in the median")
+    drawn = _draw(dataset, output)
+    say(f"Wrote study.nc, study.csv{' and study.png' if drawn else ''} in {output}/")
+    document = {
+        "schema": "layerfit/study",
+        "version": 1,
+        "sizes": {str(name): size for name, size in dataset.sizes.items()},
+        "failed": len(failures),
+        "medians": finite(medians),
+        "table": str(output / "study.csv"),
+    }
+    return Done(document, ("presets",), not failures)
+
+
+def _draw(dataset: Any, output: Path) -> bool:
+    """A picture of the worst error, or of the first number that was measured; none without matplotlib."""
+    from importlib.util import find_spec
+
+    if not find_spec("matplotlib"):
+        return False
+    import io
+
+    from ..documents import write_bytes
+    from ..plot import plot_study
+
+    variable = "error" if "error" in dataset else str(next(iter(dataset.data_vars)))
+    picture = io.BytesIO()
+    figure: Any = plot_study(dataset, variable).figure
+    figure.savefig(picture, dpi=120)
+    write_bytes(output / "study.png", picture.getvalue())
+    return True

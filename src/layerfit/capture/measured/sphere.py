@@ -1,7 +1,7 @@
 """A sphere of a measured BRDF, to look at: values between the samples, where there are samples near enough."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -34,10 +34,16 @@ def sphere_of(view: MeasuredView) -> View:
     return dataclasses.replace(seen, target=target, picture=seen.image(target)).some(near)
 
 
-def bare_sphere(path: Path, side: int, thickness_scale: Mapping[str, float] | None = None) -> View:
-    """A sphere under one distant light as if a file held it: what is lit of `side` x `side` pixels, to be given its target."""
+def bare_sphere(
+    path: Path,
+    side: int,
+    thickness_scale: Mapping[str, float] | None = None,
+    to_light: Sequence[float] = TO_LIGHT,
+) -> View:
+    """A sphere under one distant light as if a file held it: what is lit of `side` x `side` pixels, to be given its target; the camera
+    looks along -z."""
     camera = Camera((0.0, 0.0, DISTANCE), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), float(2.0 * np.degrees(np.arctan(1.04 / DISTANCE))))
-    light = Directional(tuple(normalise(np.array(TO_LIGHT)).tolist()), (np.pi, np.pi, np.pi))
+    light = Directional(tuple(normalise(np.array(to_light)).tolist()), (np.pi, np.pi, np.pi))
     surface = sphere_surface(Sphere(), camera, side, side)
     index = np.flatnonzero(surface.covered & (surface.normal @ light.to_light > 0.0))
     position, normal = (a.reshape(-1, 3)[index] for a in (surface.position, surface.normal))
