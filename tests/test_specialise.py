@@ -77,7 +77,7 @@ def test_what_a_scene_asks_beyond_the_material_is_refused_before_any_work(comman
 
 
 def test_parts_of_a_coated_metal(monkeypatch):
-    monkeypatch.setattr("layerfit.study.removals.variants", lambda stack: {})
+    monkeypatch.setattr("layerfit.study.removals.materials", lambda stack: {})
     stack = Stack((varnish(tau_s=0.2, g=0.5),), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.3, **COPPER))
     found = {removal.what: removal for removal in removals(stack)}
     assert set(found) >= {"coat: coat", "coat: absorption", "coat: scattering", "coat: colour of tau", "base: anisotropy"}

@@ -13,7 +13,7 @@ from helpers import STACKS, needs_tools, varnish
 from layerfit.errors import MachineError
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.precise import Precise
-from layerfit.preset import write_preset
+from layerfit.preset import preset_of, write_preset
 from layerfit.report.scatter import Panel, Point, scatter
 from layerfit.report.tradeoff import fit_front, front
 from layerfit.stack import Stack
@@ -21,7 +21,7 @@ from layerfit.study import fits, shaders
 from layerfit.study.errors import relative, seen
 from layerfit.study.kept import Kept
 from layerfit.study.shaders import shaders_of, table_bytes
-from layerfit.study.variants import EXACT, TABLE_ENTRIES, variants
+from layerfit.study.variants import EXACT, TABLE_ENTRIES, materials, variants
 from layerfit.surfaces import Conductor, Dielectric, Lambert
 from layerfit.tradeoffs import FILES, PARTS, against_walk
 
@@ -53,8 +53,10 @@ def test_ways_of_a_coated_metal():
     stack = Stack((varnish(),), Conductor(alpha=0.2, eta=[0.2, 0.9, 1.1], k=[3.9, 2.5, 2.1]), Corrected(orders=2))
     found = variants(stack)
     orders = ["corrected, 0 orders", "corrected, 1 order"]
+    assert list(materials(stack)) == [EXACT, "precise", "faithful", *orders, "schlick", "lazanyi"]
+    assert all(preset_of(way, "m")["base"]["type"] == "conductor" for way in materials(stack).values())
     tables = [f"tables, {entries}" for entries in TABLE_ENTRIES]
-    assert list(found) == [EXACT, "precise", "faithful", "faithful, compact", *orders, *tables, "schlick", "lazanyi"]
+    assert list(found) == [EXACT, "precise", "faithful", *orders, "schlick", "lazanyi", "faithful, compact", *tables]
     assert [table_bytes(shader) for shader in shaders_of({n: found[n] for n in tables}).values()] == [320, 1280, 5120, 20480]
     assert found[EXACT] is stack
     assert isinstance(found["precise"].form, Precise)

@@ -10,7 +10,7 @@ from .._fields import params
 from ..errors import InputError
 from ..preset import FORM_KEYS, preset_of, stack_of
 from ..stack import Stack
-from .variants import EXACT, variants
+from .variants import EXACT, materials
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "absorption": ("tau", "absorption_per_mm", "thickness_um"),
@@ -35,7 +35,7 @@ def removals(stack: Stack) -> list[Removal]:
     found = [Removal(f"{layer.name}: coat", stack.without(layer.name)) for layer in stack.layers]
     for k, layer in enumerate((*stack.layers, stack.base)):
         found += [Removal(f"{layer.name}: {what}", _with(stack, k, made), held) for what, made, held in _simpler(layer)]
-    found += [Removal(f"form: {name} instead", way) for name, way in variants(stack).items() if name != EXACT]
+    found += [Removal(f"form: {name} instead", way) for name, way in materials(stack).items() if name != EXACT]
     return [removal for removal in found if _is_material(removal.stack)]
 
 

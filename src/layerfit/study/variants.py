@@ -23,12 +23,27 @@ COMPACT_ERRORS = (1e-2, 1e-3, 1e-4)
 def variants(stack: Stack) -> dict[str, Stack]:
     """Every way by its name, the material itself first. What prints the same shader is listed once."""
     forms = _forms(stack)
-    ways = {EXACT: stack, **_compact(stack), **forms, **_compact_forms(forms), **_fewer_orders(stack), **_tables(stack)}
-    ways |= {kind: approximate for kind in ("schlick", "lazanyi") if (approximate := with_fresnel(stack, kind)) is not None}
+    cheaper = {**_compact(stack), **_compact_forms(forms), **_tables(stack)}
+    return _distinct({EXACT: stack, **forms, **_fewer_orders(stack), **_reflectances(stack), **cheaper})
+
+
+def materials(stack: Stack) -> dict[str, Stack]:
+    """Those of them that are materials as a preset holds them: other forms, fewer orders, other reflectances."""
+    return _distinct({EXACT: stack, **_forms(stack), **_fewer_orders(stack), **_reflectances(stack)})
+
+
+def _distinct(ways: dict[str, Stack]) -> dict[str, Stack]:
+    """The first of those that print the same shader."""
     seen: dict[str, str] = {}
     for name, way in ways.items():
         seen.setdefault(print_material(way, "m").functions, name)
     return {name: ways[name] for name in seen.values()}
+
+
+def _reflectances(stack: Stack) -> dict[str, Stack]:
+    """With reflectances that are not exact."""
+    kinds = ("schlick", "lazanyi")
+    return {kind: approximate for kind in kinds if (approximate := with_fresnel(stack, kind)) is not None}
 
 
 def _forms(stack: Stack) -> dict[str, Stack]:
