@@ -77,9 +77,11 @@ DIALECTS = {
     "three": Dialect(
         "three.js r187, MeshPhysicalMaterial", layered=True, compensates="base", metal_dims=True, gaussian=True, film="view"
     ),
-    # Babylon.js, pbrClearCoatFunctions and pbrDirectLightingFunctions.
+    # Babylon.js, pbrClearCoatFunctions and pbrDirectLightingFunctions of release 9.34.
     "babylon": Dialect(
-        "Babylon.js PBRMaterial with a clear coat",
+        "Babylon.js 9, PBRMaterial with a clear coat",
+        layered=True,
+        compensates="base",
         coat_index=True,
         coat_masking="kelemen",
         passes="half",

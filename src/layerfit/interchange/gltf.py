@@ -43,9 +43,8 @@ def material(engine: Engine, name: str) -> dict[str, Any]:
         extensions[IOR] = {"ior": words.digits(engine.ior)}
     elif engine.base != "metal":
         extensions[SPECULAR] = {"specularFactor": 0.0}  # else a dielectric has a lobe of its own
-    if pair is not None:  # alpha along the direction is mix(alpha, 1, strength^2), across it alpha
-        strength = math.sqrt((pair[0] - pair[1]) / max(1.0 - pair[1], 1e-6))
-        extensions[ANISOTROPY] = {"anisotropyStrength": words.digits(strength)}
+    if pair is not None:
+        extensions[ANISOTROPY] = {"anisotropyStrength": words.strength(pair)}
         if words.across(engine):
             extensions[ANISOTROPY]["anisotropyRotation"] = words.digits(0.5 * math.pi)
     if engine.coat_alpha is not None:

@@ -1,7 +1,6 @@
 """three.js and Babylon.js: a module of code that makes the material."""
 
 import json
-import math
 from typing import Any
 
 from ..shader.export import print_material
@@ -92,7 +91,7 @@ def write_babylon(found: Conversion) -> str:
 def babylon_settings(engine: Engine) -> dict[str, str]:
     """Settings of a PBRMaterial, as code."""
     pair = words.widths(engine)
-    alpha = engine.alpha if pair is None else math.sqrt(pair[0] * pair[1])
+    alpha = engine.alpha if pair is None else pair[1]
     settings = {
         "albedoColor": _color3(words.color(engine.base_color)),
         "metallic": f"{words.metallic(engine):g}",
@@ -106,15 +105,12 @@ def babylon_settings(engine: Engine) -> dict[str, str]:
 
 
 def _babylon_grain(engine: Engine, pair: tuple[float, float] | None) -> dict[str, str]:
-    """Widths are alpha (1 + intensity) along the direction and alpha (1 - intensity) across it."""
+    """As in glTF, from Babylon.js 6.4 on."""
     if pair is None:
         return {}
-    intensity = (pair[0] - pair[1]) / (pair[0] + pair[1])
     direction = "new Vector2(0, 1)" if words.across(engine) else "new Vector2(1, 0)"
-    grain = {"isEnabled": "true", "intensity": f"{words.digits(intensity):g}", "direction": direction}
-    return {f"anisotropy.{key}": value for key, value in grain.items()} | {
-        "roughness": f"{words.roughness(0.5 * (pair[0] + pair[1])):g}"
-    }
+    grain = {"isEnabled": "true", "intensity": f"{words.strength(pair):g}", "direction": direction}
+    return {f"anisotropy.{key}": value for key, value in grain.items()}
 
 
 def _babylon_coat(engine: Engine) -> dict[str, str]:

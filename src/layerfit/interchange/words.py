@@ -33,6 +33,11 @@ def widths(engine: Engine) -> tuple[float, float] | None:
     return max(x, y), min(x, y)
 
 
+def strength(pair: tuple[float, float]) -> float:
+    """The anisotropy of glTF and Babylon.js: the greater width is mix(smaller, 1, strength^2)."""
+    return digits(math.sqrt((pair[0] - pair[1]) / max(1.0 - pair[1], 1e-6)))
+
+
 def across(engine: Engine) -> bool:
     """Whether the greater width lies across the tangent."""
     return engine.alpha_x is not None and float(engine.alpha_y) > float(engine.alpha_x)
