@@ -14,6 +14,7 @@ pytest.importorskip("distributed", reason="pip install 'layerfit[cluster]'")
 EXAMPLE = Path(__file__).parents[1] / "examples" / "lost_worker.py"
 
 
+@pytest.mark.slow
 def test_a_worker_of_a_cluster_may_be_killed(tmp_path):
     """The example: two workers, one killed while it has work, and every fit done. Its values are those of one process."""
     ran = subprocess.run(
