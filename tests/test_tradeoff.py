@@ -21,7 +21,7 @@ from layerfit.study import fits, shaders
 from layerfit.study.errors import relative, seen
 from layerfit.study.kept import Kept
 from layerfit.study.shaders import shaders_of, table_bytes
-from layerfit.study.variants import EXACT, TABLE_ENTRIES, materials, materials, variants
+from layerfit.study.variants import EXACT, TABLE_ENTRIES, materials, variants
 from layerfit.surfaces import Conductor, Dielectric, Lambert
 from layerfit.tradeoffs import FILES, PARTS, against_walk
 
