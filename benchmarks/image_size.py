@@ -17,7 +17,8 @@ from rich.table import Table
 
 from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import sphere_surface
-from layerfit.capture.samples import View, load_reference
+from layerfit.capture.reference import load_reference
+from layerfit.capture.samples import View
 from layerfit.capture.scene import Camera, Directional, Reference, Sphere
 from layerfit.fit.fit import fit
 from layerfit.fit.result import FitResult

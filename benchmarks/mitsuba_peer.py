@@ -26,7 +26,8 @@ from rich.console import Console
 from rich.table import Table
 
 from layerfit.capture.exr import write_exr
-from layerfit.capture.samples import View, load_reference
+from layerfit.capture.reference import load_reference
+from layerfit.capture.samples import View
 from layerfit.capture.scene import Camera, Directional, Reference, Sphere
 from layerfit.fit.blocks import arrange, weighted
 from layerfit.fit.fit import fit

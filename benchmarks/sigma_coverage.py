@@ -23,7 +23,7 @@ import layerfit as lf
 from layerfit._place import narrowed
 from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import sphere_surface
-from layerfit.capture.samples import load_reference
+from layerfit.capture.reference import load_reference
 from layerfit.capture.scene import Camera, Directional, Light, Reference, Sphere
 from layerfit.fit.parameters import parametrise
 

@@ -22,7 +22,8 @@ import pytest
 from layerfit._compiled import fusion_emitters
 from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import sphere_surface
-from layerfit.capture.samples import View, load_reference
+from layerfit.capture.reference import load_reference
+from layerfit.capture.samples import View
 from layerfit.capture.scene import Camera, Directional, Reference, Sphere
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful

@@ -31,7 +31,7 @@ BRANCHES = [
     [{"capture"}, {"fit"}],
     [
         {"shader.bounds", "shader.glsl", "shader.helpers", "shader.names"},
-        {"shader.primitives"},
+        {"shader.primitives", "shader.structs"},
         {"shader.printer"},
         {"shader.export", "shader.program"},
         {"shader.gl"},

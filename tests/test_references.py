@@ -10,7 +10,7 @@ import pytest
 from helpers import COPPER
 from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import sphere_surface
-from layerfit.capture.samples import load_reference
+from layerfit.capture.reference import load_reference
 from layerfit.capture.scene import Camera, Constant, Directional, Reference, Sphere
 from layerfit.capture.scene_file import read_scene
 from layerfit.errors import InputError

@@ -7,7 +7,7 @@ from PIL import Image
 from layerfit.capture.exr import write_exr
 from layerfit.capture.geometry import camera_rays, frames, sphere_surface, sphere_tangent
 from layerfit.capture.lights import HALF_VECTOR_WIDTHS, _half_vector_pdf, receive
-from layerfit.capture.samples import load_reference
+from layerfit.capture.reference import load_reference
 from layerfit.capture.scene import (
     Camera,
     Constant,

@@ -1,7 +1,8 @@
 """From a scene to what a fit sees of each reference."""
 
 from .measured.view import MeasuredView, load_measured
-from .samples import View, load_reference
+from .reference import load_reference
+from .samples import View
 from .scene import MeasuredReference, Scene
 
 AnyView = View | MeasuredView

@@ -14,7 +14,8 @@ import jax
 import numpy as np
 
 from ..capture.geometry import normalise
-from ..capture.samples import Samples, View, load_reference
+from ..capture.reference import load_reference
+from ..capture.samples import Samples, View
 from ..capture.scene import Constant, Directional, Reference, Scene
 from ..errors import InputError
 from ..stack import Stack

@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 
 from ..capture.geometry import frames
-from ..capture.samples import View, load_reference
+from ..capture.reference import load_reference
+from ..capture.samples import View
 from ..capture.scene import MeasuredReference, Reference, Scene
 from ..errors import InputError
 from ..fit.pixels import directions

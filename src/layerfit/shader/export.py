@@ -24,7 +24,8 @@ from ..preset import left_out, model_name
 from ..stack import PREPARED, Stack, at, evaluate, prepared
 from .bounds import ANY, Bounds
 from .glsl import literal
-from .printer import PREFIX, Printer, named_leaves
+from .printer import PREFIX, Printer
+from .structs import named_leaves
 
 SIZES = {"uv": ("vec2", (2,)), "distance": ("float", ()), "sky": ("float", ())}
 """What a material may read of a place: its type in the shader and in JAX."""

@@ -18,6 +18,7 @@ from .bounds import ANY, Bounds, exactly, known, read, resolved, settled
 from .glsl import ATOM, PREFIX, UNARY, PrintError, StructType, Value, glsl_type, indent, lift, literal, reads, safe
 from .names import name_of, source_of
 from .primitives import BUILTINS, GUARDS, PRIMITIVES
+from .structs import comment_lines, comment_of, grouped, leaves_of, result_paths, struct_text, struct_value
 
 
 class Printer:
@@ -32,7 +33,7 @@ class Printer:
 
     def structs_text(self) -> str:
         """Declarations of the structs."""
-        return "\n".join(_struct_text(s) for s in self.structs.values())
+        return "\n".join(struct_text(s) for s in self.structs.values())
 
     def functions_text(self) -> str:
         """Tables, helpers and functions, each before its first use."""
@@ -52,14 +53,14 @@ class Printer:
         key = (cls.__name__, tuple(leaves))
         if key not in self.structs:
             taken = sum(name == cls.__name__ for name, _ in self.structs)
-            comments = {safe(f.name): _comment(f) for f in dataclasses.fields(cls)}
+            comments = {safe(f.name): comment_of(f) for f in dataclasses.fields(cls)}
             fields = tuple((name, kind, comments.get(name, "")) for name, kind in leaves)
             self.structs[key] = StructType(cls.__name__ + (str(taken + 1) if taken else ""), fields)
         return self.structs[key]
 
     def constant(self, name: str, value: Any) -> str:
         """Declare a struct or a number as a constant, a field a line with its unit and meaning."""
-        leaves = [(key, np.asarray(leaf, np.float32)) for key, leaf in _leaves(value)]
+        leaves = [(key, np.asarray(leaf, np.float32)) for key, leaf in leaves_of(value)]
         if not dataclasses.is_dataclass(value):
             return f"const {glsl_type(leaves[0][1])} {name} = {literal(leaves[0][1])};\n"
         struct = self.struct(value, [(key, glsl_type(leaf)) for key, leaf in leaves])
@@ -74,7 +75,7 @@ class Printer:
 
     def uniform(self, name: str, value: Any) -> str:
         """Declare a struct or a number as a uniform."""
-        leaves = [(key, glsl_type(np.asarray(leaf, np.float32))) for key, leaf in _leaves(value)]
+        leaves = [(key, glsl_type(np.asarray(leaf, np.float32))) for key, leaf in leaves_of(value)]
         kind = self.struct(value, leaves).name if dataclasses.is_dataclass(value) else leaves[0][1]
         return f"uniform {kind} {name};\n"
 
@@ -97,12 +98,12 @@ class Printer:
         body = Body(self, closed.jaxpr, closed.consts, bounds)
         names: list[str] = []
         for tree, text in given:
-            for path, leaf in _leaves(tree):
+            for path, leaf in leaves_of(tree):
                 names.append(f"{text}.{path}" if path else text)
                 kind = glsl_type(jax.numpy.asarray(leaf).aval if not hasattr(leaf, "aval") else leaf.aval)
                 body.bind_next(Value(names[-1], kind))
             if dataclasses.is_dataclass(tree):
-                self.struct(tree, [(path, glsl_type(np.asarray(leaf, np.float32))) for path, leaf in _leaves(tree)])
+                self.struct(tree, [(path, glsl_type(np.asarray(leaf, np.float32))) for path, leaf in leaves_of(tree)])
         declared = []
         for array, param, _ in params:
             declared.append(f"{glsl_type(array)} {param}")
@@ -110,7 +111,7 @@ class Printer:
             body.bind_next(Value(param, glsl_type(array), reads=frozenset({param})))
         (result,) = body.run()
         kind = glsl_type(closed.out_avals[0])
-        doc = _comment_lines(fn)
+        doc = comment_lines(fn)
         text = f"{doc}{kind} {name}({', '.join(declared)}) {{\n{indent(body.text(lift(result, kind)))}}}\n"
         self.functions[name] = (name, text)
 
@@ -124,7 +125,7 @@ class Printer:
         jaxpr, fn = closed.jaxpr, self.chunks[name]
         info = jaxpr.debug_info
         notes = inspect.get_annotations(fn)
-        groups = _group(info.arg_names, [v.aval for v in jaxpr.invars])
+        groups = grouped(info.arg_names, [v.aval for v in jaxpr.invars])
         params = [
             (root, leaves[0][1] if leaves[0][0] == "" else "", self.struct(notes[root], leaves) if leaves[0][0] else None)
             for root, leaves in groups
@@ -135,7 +136,7 @@ class Printer:
                 raise PrintError(
                     f"the chunk {name} returns several values: give them a struct, and the function its annotation"
                 )
-            ((_, leaves),) = _group(_result_paths(info, notes["return"]), [v.aval for v in jaxpr.outvars])
+            ((_, leaves),) = grouped(result_paths(info, notes["return"]), [v.aval for v in jaxpr.outvars])
             returned = self.struct(notes["return"], leaves)
         body = Body(self, jaxpr, closed.consts, bounds)
         for (root, kind, struct), (_, leaves) in zip(params, groups, strict=True):
@@ -155,7 +156,7 @@ class Printer:
         # Other parameter types overload the name; the same types with another body (other structure) need a name of their own.
         variants = sum(isinstance(k, tuple) and k[0] == same_types for k in self.functions)
         glsl_name = PREFIX + name + (str(variants + 1) if variants else "")
-        text = f"{_comment_lines(fn)}{kind} {glsl_name}{printed}"
+        text = f"{comment_lines(fn)}{kind} {glsl_name}{printed}"
         self.functions[same_types, variants] = (glsl_name, text)
         return glsl_name, params, returned
 
@@ -327,7 +328,7 @@ class Body:
         arguments = []
         for _, kind, struct in params:
             taken, rest = (rest[: len(struct.fields)], rest[len(struct.fields) :]) if struct else (rest[:1], rest[1:])
-            arguments.append(_whole(taken, struct) if struct else lift(taken[0], kind))
+            arguments.append(struct_value(taken, struct) if struct else lift(taken[0], kind))
         text = f"{glsl_name}({', '.join(a.text for a in arguments)})"
         reads = frozenset().union(*(a.reads for a in arguments))
         if returned is None:
@@ -370,64 +371,6 @@ class Body:
         self.lines[start:] = [f"    {line}" for line in self.lines[start:]] + ["}"]
         self.declared, self.taken = known, taken
         return state
-
-
-def _whole(leaves: Sequence[Value], struct: StructType) -> Value:
-    """The struct that these leaves are all of, or a new one made of them."""
-    reads = frozenset().union(*(v.reads for v in leaves))
-    roots = {v.text.rpartition(".")[0] for v in leaves}
-    root = roots.pop() if len(roots) == 1 else ""
-    if root and all(v.text == f"{root}.{name}" for v, (name, _, _) in zip(leaves, struct.fields, strict=True)):
-        return Value(root, struct.name, reads=reads)
-    lifted = [lift(v, kind).text for v, (_, kind, _) in zip(leaves, struct.fields, strict=True)]
-    return Value(f"{struct.name}({', '.join(lifted)})", struct.name, reads=reads)
-
-
-def _leaves(tree: Any) -> list[tuple[str, Any]]:
-    leaves = jax.tree_util.tree_leaves_with_path(tree)
-    return [(safe(jax.tree_util.keystr(path, simple=True, separator=".")), leaf) for path, leaf in leaves]
-
-
-def named_leaves(root: str, value: Any) -> list[tuple[str, np.ndarray]]:
-    """The numbers of a struct by the expressions that reach them, such as `lf_coat.eta`; of a number, that alone."""
-    return [(f"{root}.{path}" if path else root, np.asarray(leaf, np.float32)) for path, leaf in _leaves(value)]
-
-
-def _group(paths: Sequence[str], avals: Sequence[Any]) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Leaves such as `coat.alpha`, `coat.eta`, `c` by their argument: coat with two fields, c with none."""
-    groups: list[tuple[str, list[tuple[str, str]]]] = []
-    for path, aval in zip(paths, avals, strict=True):
-        root, _, leaf = path.partition(".")
-        if not groups or groups[-1][0] != root:
-            groups.append((root, []))
-        groups[-1][1].append((safe(leaf), glsl_type(aval)))
-    return groups
-
-
-def _result_paths(info: Any, cls: Any) -> list[str]:
-    """Leaves of the struct that a chunk returns, as `result.field`."""
-    if all("." in path for path in info.result_paths):
-        return info.result_paths
-    # JAX finds the fields by building a struct of placeholders, which one that checks its arguments does not take.
-    return [f"result.{field.name}" for field in dataclasses.fields(cls)]
-
-
-def _comment(field: dataclasses.Field[Any]) -> str:
-    spec = field.metadata.get("param")
-    if spec is not None:
-        return spec.doc + (f" [{spec.unit}]" if spec.unit != "1" else "")
-    return field.metadata.get("comment", "")
-
-
-def _comment_lines(fn: Callable[..., Any]) -> str:
-    first = (inspect.getdoc(fn) or "").split("\n\n")[0]
-    return "".join(f"// {line}\n" for line in first.splitlines())
-
-
-def _struct_text(struct: StructType) -> str:
-    width = max(len(kind) + len(name) for name, kind, _ in struct.fields) + 2
-    rows = [(f"{kind} {name};", comment) for name, kind, comment in struct.fields]
-    return f"struct {struct.name} {{\n" + "".join(f"    {text:<{width}}  // {note}\n" for text, note in rows) + "};\n"
 
 
 def scan_sizes(params: Mapping[str, Any]) -> tuple[int, int]:

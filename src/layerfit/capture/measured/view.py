@@ -7,7 +7,8 @@ import numpy as np
 from ..._place import grain
 from ...errors import InputError
 from ...stack import Stack
-from ..samples import LEAST_PIXELS, Samples, layer_scales
+from ..reference import LEAST_PIXELS
+from ..samples import Samples, layer_scales
 from ..scene import Lit, MeasuredReference
 from .data import MeasuredBrdf, half_angle, sieve
 from .read import read_brdf
