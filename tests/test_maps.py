@@ -13,6 +13,8 @@ from commands import layerfit
 from layerfit import Coat, Corrected, InputError, Lambert, MapFit, Precise, Stack, fit_map, predict, print_material, read_scene
 from layerfit.capture.exr import read_exr, write_exr
 from layerfit.capture.geometry import frames
+from layerfit.capture.reference import load_reference
+from layerfit.capture.scene import Camera, Directional, Reference, Sphere
 from layerfit.fit.parameters import known_parameters
 from layerfit.maps import model
 from layerfit.maps.descent import Descent
@@ -220,6 +222,44 @@ def test_a_map_over_texture_coordinates(panel):
     fine = observe(scene, scene.start, SIDE)
     np.testing.assert_array_equal(fine.index, pixels.index)
     np.testing.assert_array_equal(np.sort(fine.rows), np.sort(pixels.rows))
+
+
+def test_views_from_anywhere_make_one_map(tmp_path):
+    """A sphere seen by two cameras under three lights each, whose varnish has another thickness in every texel of its coordinates."""
+    size, side = 8, 40
+    wanted = np.random.default_rng(3).uniform(15.0, 60.0, (size, size))
+    entries = []
+    for k, (eye, to_light) in enumerate(
+        [(eye, w) for eye in ([0.0, 0.5, 5.0], [3.5, 0.5, 3.5]) for w in ([0.3, 0.6, 0.8], [0.7, 0.2, 0.7], [0.1, 0.1, 1.0])]
+    ):
+        camera, light = (
+            Camera(tuple(eye), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 26.0),
+            Directional(tuple(to_light / np.linalg.norm(to_light)), (np.pi,) * 3),
+        )
+        path = tmp_path / f"view{k}.exr"
+        write_exr(path, {c: np.ones((side, side)) for c in "RGB"})
+        view = load_reference(Reference(path, camera, (light,), Sphere(), {}, None, {}), 0.1)
+        samples, image = view.samples(), np.zeros((side * side, 3))
+        column, row = (np.minimum((view.uv * [1.0, -1.0] + [0.0, 1.0]) * size, size - 1e-6)).astype(int).T
+        for at in np.unique(row * size + column):
+            which = np.flatnonzero(row * size + column == at)
+            coat = dataclasses.replace(STACK.layers[0], thickness_um=wanted.flat[at])
+            seen = (a[which] for a in (samples.wi, samples.wo, samples.weight))
+            image[view.index[which]] = predict(STACK.with_parts([coat, STACK.base]), *seen)
+        image *= 1.0 + NOISE * np.random.default_rng(k).normal(size=image.shape)
+        write_exr(path, {c: image[:, i].reshape(side, side) for i, c in enumerate("RGB")})
+        entries.append(
+            f'[[reference]]\nexr = "{path.name}"\n[reference.camera]\nposition = {eye}\nlook_at = [0, 0, 0]\nvfov_deg = 26\n'
+            f'[[reference.light]]\ntype = "directional"\nto_light = {to_light}\nirradiance_rgb = {np.pi}\n'
+        )
+    rest = SCENE[SCENE.index("[material]") :].replace(', "tilt"', "").replace("starts = 1", f"starts = 1\nsize = {size}")
+    (tmp_path / "scene.toml").write_text("".join(entries) + '[geometry]\nkind = "sphere"\n' + rest)
+    found = fit_map(tmp_path / "scene.toml")
+    there = found.seen >= 3
+    assert there.sum() > 20
+    np.testing.assert_allclose(found.values["coat.thickness_um"][there], wanted[there], rtol=0.02)
+    z = ((found.values["coat.thickness_um"] - wanted) / found.sigmas["coat.thickness_um"])[there]
+    assert np.mean(np.abs(z) < 2.0) > 0.8
 
 
 def test_limits_not_noise(panel, found, tmp_path):
