@@ -127,8 +127,7 @@ def test_the_residual_has_the_variance_of_its_flakes(kept):
     """Closed form: the square of a Gaussian lobe is one of half the variance, and its mean over Gaussian tilts a wider one."""
     paint = CarPaint(ks=1.0, f0=1.0, alpha=0.3, sparkle=0.6, **GRID)
     stack = Stack((), paint).astype(np.float64)
-    wi = np.array([0.0, 0.0, 1.0])
-    wo = direction(20.0)
+    wi, wo = jnp.array([0.0, 0.0, 1.0]), jnp.asarray(direction(20.0))
     uv = (np.random.default_rng(4).integers(-(10**5), 10**5, (MANY, 2)) + 0.5) / 400.0
     distance = np.sqrt(1.0 / kept - 1.0)  # kept = 1 / (1 + distance^2)
     values = np.asarray(

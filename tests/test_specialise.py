@@ -1,5 +1,6 @@
 """What a scene does not need goes, what it needs stays, and what was done is said."""
 
+import inspect
 import json
 import re
 
@@ -77,7 +78,7 @@ def test_what_a_scene_asks_beyond_the_material_is_refused_before_any_work(comman
 
 
 def test_parts_of_a_coated_metal(monkeypatch):
-    monkeypatch.setattr("layerfit.study.removals.materials", lambda stack: {})
+    monkeypatch.setattr(inspect.getmodule(removals), "materials", lambda stack: {})  # `layerfit.study` is a function
     stack = Stack((varnish(tau_s=0.2, g=0.5),), Conductor(alpha=None, alpha_x=0.1, alpha_y=0.3, **COPPER))
     found = {removal.what: removal for removal in removals(stack)}
     assert set(found) >= {"coat: coat", "coat: absorption", "coat: scattering", "coat: colour of tau", "base: anisotropy"}

@@ -169,7 +169,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -253,7 +253,7 @@ vec3 lf_projected(float path, float theta, vec3 tau) {
 float lf_half_cosine2(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = dot(s, s);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -268,7 +268,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 twice_ac = 2.0 * a * c;
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
 }
 
 // 0 where the indices match and there is no interface, 1 from the first index of the tables on.

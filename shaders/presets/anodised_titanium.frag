@@ -40,7 +40,7 @@ const Conductor lf_titanium = Conductor(
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.

@@ -224,7 +224,7 @@ float lf_lost_variance(float distance, float half_distance) {
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -335,7 +335,7 @@ vec3 lf_half_vector2(vec3 wi, vec3 wo) {
 float lf_half_cosine2(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
     float s2 = dot(s, s);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -350,7 +350,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 twice_ac = 2.0 * a * c;
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.

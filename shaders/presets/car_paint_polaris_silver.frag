@@ -43,7 +43,7 @@ vec4 lf_half_vector(vec4 wi, vec4 wo) {
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Schlick 1994, eq. 15, from the reflectance at normal incidence.

@@ -251,7 +251,7 @@ float lf_lost_variance(float distance, float half_distance) {
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -357,7 +357,7 @@ vec3 lf_half_vector2(vec3 wi, vec3 wo) {
 float lf_half_cosine2(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
     float s2 = dot(s, s);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.

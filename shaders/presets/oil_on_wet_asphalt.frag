@@ -93,7 +93,7 @@ float lf_atan2(float y, float x) {
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.

@@ -289,7 +289,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -395,7 +395,7 @@ vec4 lf_half_vector2(vec4 wi, vec4 wo) {
 float lf_half_cosine2(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = dot(s, s);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -410,7 +410,7 @@ vec3 lf_fresnel_conductor2(float c, vec3 eta, vec3 k) {
     vec3 twice_ac = 2.0 * a * c;
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
@@ -427,21 +427,6 @@ float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) 
 // The same by the depth of scattering within `tau`, and paths in thicknesses: 1 / cos, or longer below a rough boundary.
 vec3 lf_once_back(float phase, vec3 tau_s, vec3 tau, float path_i, float path_o) {
     return tau_s * (phase * path_i * path_o) * lf_mean_transmittance(tau * (path_i + path_o));
-}
-
-// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
-vec3 lf_fresnel_conductor3(float c, vec3 eta, vec3 k) {
-    float c2 = c * c;
-    float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
 }
 
 // The same for light that goes on to the other side.
@@ -487,6 +472,21 @@ TwoFlux lf_kubelka_munk(vec3 Kx, float Sx) {
     vec3 cosh_z = mix(0.5 * (1.0 + fall * fall), cosh_z2, thin);
     vec3 whole = (Kx + Sx) * sinh_z + cosh_z;
     return TwoFlux(Sx * sinh_z / whole, fall / whole);
+}
+
+// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
+vec3 lf_fresnel_conductor3(float c, vec3 eta, vec3 k) {
+    float c2 = c * c;
+    float s2 = 1.0 - c2;
+    vec3 p = (eta - k) * (eta + k) - s2;
+    vec3 nk = eta * k;
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
+    vec3 twice_ac = 2.0 * a * c;
+    vec3 even = q * c2 + s2 * s2;
+    vec3 odd = twice_ac * s2;
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -652,18 +652,18 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     vec3 f3 = lf_once_back(0.07957747, t2, t3, path, path2);
     Fluence beam_i = lf_fluence(t3, path);
     Fluence beam_o = lf_fluence(t3, path2);
-    vec3 up_i = lf_fresnel_conductor3(i.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path);
-    vec3 up_o = lf_fresnel_conductor3(o.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path2);
+    vec3 up_i = lf_fresnel_conductor2(i.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path);
+    vec3 up_o = lf_fresnel_conductor2(o.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path2);
     vec3 f4 = lf_once_by_mirror(0.07957747, 0.07957747, t2, t3, path, path2, up_i, up_o);
     f3 = f3 + f4;
-    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor3(i.w.w, lf_base.eta, lf_base.k), R_i);
-    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor3(o.w.w, lf_base.eta, lf_base.k), R_o);
+    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor2(i.w.w, lf_base.eta, lf_base.k), R_i);
+    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor2(o.w.w, lf_base.eta, lf_base.k), R_o);
     f2 = f2 + throughput * (f3 + lf_exchanged(Haze(t3, (t6 - t18 * t9 - t15 * ((t12 - t16 * t6 - t17 * t9) * t19)) * t4, (t7 - t18 * t10 - t15 * t13) * t4, (t8 - t18 * t11 - t15 * t14) * t4, (t10 - t21 * t13) * t4, (t11 - t21 * t14) * t4, t14 * t4), beam_i, beam_o));
     vec3 patina = lit2 ? f2 : vec3(0.0);
     TwoFlux layer = lf_kubelka_munk(lf_patina_crust.absorbed * thickness, lf_patina_crust.scattered * thickness);
     vec3 diffuse = layer.R / 3.1415927;
     patina = patina + diffuse;
-    F2 = lf_fresnel_conductor2(lf_half_cosine(wi, wo), lf_base_bare.eta, lf_base_bare.k);
+    F2 = lf_fresnel_conductor3(lf_half_cosine(wi, wo), lf_base_bare.eta, lf_base_bare.k);
     D = lf_ggx_d(lf_half_vector(wi, wo), lf_base_bare.alpha);
     projection_i = lf_ggx_projection(wi, lf_base_bare.alpha);
     projection_o = lf_ggx_projection(wo, lf_base_bare.alpha);

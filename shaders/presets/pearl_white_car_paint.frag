@@ -106,7 +106,7 @@ const vec3 lf_white_returned = vec3(1.8944926, 1.8957964, 2.0250332);
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -212,7 +212,7 @@ vec4 lf_half_vector2(vec4 wi, vec4 wo) {
 float lf_half_cosine2(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = dot(s, s);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.
@@ -222,7 +222,7 @@ float lf_rarer_cosine(float c, float eta) {
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
 float lf_chebyshev_argument(float c) {
-    return max((2.0 * sqrt(c) - 1.06) / 0.94, -1.0);
+    return (2.0 * sqrt(c) - 1.06) / 0.94;
 }
 
 // What Schlick's formula takes for f0 of a coat with a film, in daylight; `c` on the rarer side.
@@ -257,25 +257,6 @@ float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) 
     return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
-// sqrt(c) as -1 to 1, from where a film's polynomial begins.
-float lf_chebyshev_argument2(float c) {
-    return (2.0 * sqrt(c) - 1.06) / 0.94;
-}
-
-// What Schlick's formula takes for f0 of a coat with a film, in daylight; `c` on the rarer side.
-vec3 lf_film_on_coat2(Coat2 coat, float c) {
-    float s = lf_chebyshev_argument2(c);
-    vec3 total = coat.film_8 + 2.0 * s * coat.film_9;
-    vec3 total2 = coat.film_7 + 2.0 * s * total - coat.film_9;
-    total = coat.film_6 + 2.0 * s * total2 - total;
-    total2 = coat.film_5 + 2.0 * s * total - total2;
-    total = coat.film_4 + 2.0 * s * total2 - total;
-    total2 = coat.film_3 + 2.0 * s * total - total2;
-    total = coat.film_2 + 2.0 * s * total2 - total;
-    total2 = coat.film_1 + 2.0 * s * total - total2;
-    return coat.film_0 + s * total2 - total;
-}
-
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
 vec3 lf_with_second_facet(vec3 T, float gain) {
     return T + (1.0 - T) * gain;
@@ -285,7 +266,7 @@ vec3 lf_with_second_facet(vec3 T, float gain) {
 Crossing2 lf_cross(Interface interface_, Coat2 coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
     float c2 = lf_rarer_cosine(c, coat.eta);
-    vec3 t = lf_film_on_coat2(coat, c2);
+    vec3 t = lf_film_on_coat(coat, c2);
     vec3 below = 1.0 - min(max(lf_fresnel_schlick(c2, t) * 200.0, 0.0), 1.0);
     vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c2 * (5.0 - c2 * (10.0 - c2 * (10.0 - c2 * (5.0 - c2))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);

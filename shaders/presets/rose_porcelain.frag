@@ -118,7 +118,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.

@@ -27,7 +27,7 @@ const CookTorrance lf_base = CookTorrance(
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
     float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * s2 * inversesqrt(s2), 1.0);
+    return min(0.5 * sqrt(s2), 1.0);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).

@@ -160,6 +160,7 @@ _WHOLE: dict[str, Callable[..., list[Any]]] = {
     "reduce_max": _reduced(np.max),
     "argmax": _argmax,
     "power": lambda eqn, x: [_each(lambda base: base ** numbers().mpf(eqn.params["exponent"]), x)],
+    "rsqrt": lambda eqn, x: [_each(lambda square: 1 / numbers().sqrt(square), x)],
     "integer_pow": lambda eqn, x: [np.asarray(x ** eqn.params["y"], object)],
     "slice": lambda eqn, x: (
         [x[tuple(map(slice, eqn.params["start_indices"], eqn.params["limit_indices"]))]]
