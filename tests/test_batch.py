@@ -48,7 +48,7 @@ def test_every_scene_has_its_row(scenes, tmp_path):
     done, failed = table(tmp_path / "out")
     assert (done["batch of steel"], failed["batch of steel"]) == ("7", "8")
     assert float(done["base.alpha_x"]) == pytest.approx(0.08, rel=1e-4)
-    assert 0.0 < float(done["base.k.g.sigma"]) < 1e-4
+    assert 0.0 < float(done["base.k.g.sigma"]) < 2e-4
     assert done["error"] == ""
     assert "lost.exr" in failed["error"]
     assert first.document == json.loads((tmp_path / "out" / "batch.json").read_text())

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from layerfit.fit.words import SIGMA, blocks, measured, remarks, table
 from layerfit.report import charts, pictures
@@ -221,6 +221,19 @@ def test_rows_of_other_shapes_keep_them():
     below = np.all(picture[picture.shape[0] // 2 :] == 128, -1)
     rows, columns = np.nonzero(below)
     assert np.ptp(rows) > 1.8 * np.ptp(columns)
+
+
+def test_what_is_written_in_a_picture_is_in_its_font(monkeypatch):
+    written = []
+    monkeypatch.setattr(ImageDraw.ImageDraw, "text", lambda self, at, text, **options: written.append((text, options["font"])))
+    rng = np.random.default_rng(0)
+    image, covered = rng.random((64, 64, 3)), np.ones((64, 64), bool)
+    pictures.strip([[pictures.shown("fit", image, 1.0), pictures.difference(image, image[::-1], 1.0, covered)]])
+    missing = lambda font: bytes(font.getmask("\N{OBJECT REPLACEMENT CHARACTER}"))  # noqa: E731
+    assert {"-", "left out"} <= {text for text, _ in written}
+    for text, font in written:
+        for letter in set(text) - {" "}:
+            assert bytes(font.getmask(letter)) != missing(font), (text, letter)
 
 
 def test_a_long_caption_stays_over_its_panel():

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from layerfit.fit.residuals import initial
 from layerfit.fit.solve import NormalLevenbergMarquardt, columns, dense, descend, normal_equations, products, tangents
-from layerfit.fit.uncertainty import GROUPS, estimate
+from layerfit.fit.uncertainty import AGREEMENT, GROUPS, estimate
 
 SLOTS = ((0,), (1, 2, 3), (4,))
 RNG = np.random.default_rng(1)
@@ -207,6 +207,12 @@ def test_sigmas_are_the_scatter_of_repeated_fits(noise):
         found.append(u)
         sigmas.append(estimate(np.asarray(state.gram), *rows, part).sigma)
     np.testing.assert_allclose(np.sqrt(np.mean(np.square(sigmas), 0)), np.std(found, 0), rtol=0.25)  # of a hundred: 7 %
+
+
+def test_no_image_tells_more_digits_than_float32_has():
+    part = np.arange(600) % 12
+    found = estimate(np.array([[600.0]]), np.ones((600, 1, 1)), np.zeros((600, 1)), part)
+    np.testing.assert_allclose(found.sigma, AGREEMENT)
 
 
 def test_misfit_that_neighbours_share_widens_a_sigma():

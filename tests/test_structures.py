@@ -139,6 +139,7 @@ def test_residuals_that_are_alike_count_less():
     assert 2.0 <= together < 40.0
     # Twice the samples of the same misfit tell no more of it.
     np.testing.assert_allclose(effective((smooth + 0.1 * noise)[:600], place[:600]), together, rtol=0.35)
+    assert effective(np.zeros_like(noise), place) == 3600, "of a fit without any residual"
 
 
 def test_an_unknown_structure_is_named_with_the_nearest(tmp_path):

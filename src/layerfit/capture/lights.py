@@ -96,13 +96,7 @@ def _quadrature(
     widths: tuple[float, ...],
 ) -> tuple[np.ndarray, np.ndarray]:
     n = len(position)
-    own: _SphereSampler | _FlatSampler | _MapSampler | None = None
-    if isinstance(light, SphereLight):
-        own = _SphereSampler(light, position)
-    elif isinstance(light, FlatLight):
-        own = _FlatSampler(light, position)
-    elif isinstance(light, EnvironmentMap):
-        own = _map_sampler(light)
+    own = None if isinstance(light, Constant) else _sampler(light, position)
     # Directions to a lamp are spread over it: to what scatters everywhere they are as good as a cosine lobe.
     wide = not isinstance(light, (SphereLight, FlatLight))
     each = max(1, samples // (wide + len(widths) + (own is not None)))
@@ -121,9 +115,12 @@ def _quadrature(
     if wide:
         mixture = mixture + _cosine_pdf(wi)
     if own:
-        mixture = mixture + own.pdf(to_light)
+        density, radiance = own.seen(to_light)
+        mixture = mixture + density
+    else:
+        assert isinstance(light, Constant)
+        radiance = np.broadcast_to(light.radiance_rgb, to_light.shape)
     cosine = wi[..., 2]
-    radiance = _radiance(light, position, to_light)
     scale = np.where((cosine > 0.0) & (mixture > 0.0), cosine / np.where(mixture > 0.0, mixture * each, 1.0), 0.0)
     return to_light, radiance * scale[..., None]
 
@@ -165,17 +162,14 @@ def _half_vector_pdf(wi: np.ndarray, wo: np.ndarray, widths: tuple[float, ...]) 
     return np.where(there, lobes / (4.0 * np.pi * np.maximum(c, 1e-9) * np.where(there, z, 1.0) ** 3), 0.0)
 
 
-def _radiance(
-    light: Constant | SphereLight | FlatLight | EnvironmentMap, position: np.ndarray, to_light: np.ndarray
-) -> np.ndarray:
-    if isinstance(light, Constant):
-        return np.broadcast_to(light.radiance_rgb, to_light.shape)
+def _sampler(
+    light: SphereLight | FlatLight | EnvironmentMap, position: np.ndarray
+) -> "_SphereSampler | _FlatSampler | _MapSampler":
     if isinstance(light, SphereLight):
-        sampler = _SphereSampler(light, position)
-        return sampler.inside(to_light)[..., None] * np.asarray(light.radiance_rgb)
+        return _SphereSampler(light, position)
     if isinstance(light, FlatLight):
-        return (_FlatSampler(light, position).pdf(to_light) > 0.0)[..., None] * np.asarray(light.radiance_rgb)
-    return _map_sampler(light).radiance(to_light)
+        return _FlatSampler(light, position)
+    return _map_sampler(light)
 
 
 class _SphereSampler:
@@ -188,6 +182,7 @@ class _SphereSampler:
             raise InputError("a spherical light holds part of the surface that it lights: make its radius smaller or move it")
         self.axis = away / distance[:, None]
         self.rise = 1.0 - np.sqrt(1.0 - (light.radius / distance) ** 2)  # 1 - cos of the half angle
+        self.radiance = np.asarray(light.radiance_rgb)
 
     def draw(self, u: np.ndarray) -> np.ndarray:
         z = 1.0 - u[..., 0] * self.rise[:, None]
@@ -195,11 +190,10 @@ class _SphereSampler:
         local = np.stack([r * np.cos(phi), r * np.sin(phi), z], -1)
         return np.einsum("nji,nsj->nsi", frames(self.axis, None), local)
 
-    def inside(self, to_light: np.ndarray) -> np.ndarray:
-        return np.einsum("nsi,ni->ns", to_light, self.axis) >= (1.0 - self.rise)[:, None]
-
-    def pdf(self, to_light: np.ndarray) -> np.ndarray:
-        return self.inside(to_light) / (2.0 * np.pi * self.rise[:, None])
+    def seen(self, to_light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Density [1/sr] of directions (n, samples, 3) in what is drawn, and radiance from there."""
+        there = np.einsum("nsi,ni->ns", to_light, self.axis) >= (1.0 - self.rise)[:, None]
+        return there / (2.0 * np.pi * self.rise[:, None]), there[..., None] * self.radiance
 
 
 class _FlatSampler:
@@ -213,6 +207,7 @@ class _FlatSampler:
         self.normal = across / np.linalg.norm(across)
         self.area = (np.pi if self.round else 4.0) * np.linalg.norm(across)
         self.within = np.linalg.pinv(self.halves)  # (3, 2): a point of its plane, in half widths
+        self.radiance = np.asarray(light.radiance_rgb)
 
     def draw(self, u: np.ndarray) -> np.ndarray:
         if self.round:
@@ -223,14 +218,15 @@ class _FlatSampler:
         away = self.away[:, None] + place @ self.halves
         return away / np.linalg.norm(away, axis=-1, keepdims=True)
 
-    def pdf(self, to_light: np.ndarray) -> np.ndarray:
-        """Density over solid angle; 0 where a direction misses the light, or comes to its back."""
+    def seen(self, to_light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Density [1/sr] and radiance; both 0 where a direction misses the light, or comes to its back."""
         facing = -(to_light @ self.normal)
         distance = -(self.away @ self.normal)[:, None] / np.where(facing > 0.0, facing, 1.0)
         place = (distance[..., None] * to_light - self.away[:, None]) @ self.within
         inside = np.sum(place**2, -1) <= 1.0 if self.round else np.max(np.abs(place), -1) <= 1.0
         there = inside & (facing > 0.0) & (distance > 0.0)
-        return np.where(there, distance**2 / (self.area * np.where(there, facing, 1.0)), 0.0)
+        density = np.where(there, distance**2 / (self.area * np.where(there, facing, 1.0)), 0.0)
+        return density, there[..., None] * self.radiance
 
 
 class _MapSampler:
@@ -259,23 +255,19 @@ class _MapSampler:
         d = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)], -1)
         return _from_map(d, self.up)
 
-    def _place(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        d = _to_map(d, self.up)
+    def seen(self, to_light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Density [1/sr] of the texel, and radiance between the texels."""
+        height, width = self.texel.shape
+        d = _to_map(to_light, self.up)
         u = (np.arctan2(d[..., 0], -d[..., 2]) / (2.0 * np.pi)) % 1.0
         v = np.arccos(np.clip(d[..., 1], -1.0, 1.0)) / np.pi
-        return u, v
-
-    def pdf(self, to_light: np.ndarray) -> np.ndarray:
-        height, width = self.texel.shape
-        u, v = self._place(to_light)
         row = np.minimum((v * height).astype(int), height - 1)
         column = np.minimum((u * width).astype(int), width - 1)
         sine = np.maximum(np.sin(np.pi * v), 1e-6)
-        return self.texel[row, column] * height * width / (2.0 * np.pi**2 * sine)
+        return self.texel[row, column] * height * width / (2.0 * np.pi**2 * sine), self._between(u, v)
 
-    def radiance(self, to_light: np.ndarray) -> np.ndarray:
+    def _between(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         height, width = self.texel.shape
-        u, v = self._place(to_light)
         x = u * width - 0.5
         y = v * (height - 1) if self.on_poles else np.clip(v * height - 0.5, 0.0, height - 1.0)
         x0, y0 = np.floor(x).astype(int), np.minimum(np.floor(y).astype(int), max(height - 2, 0))

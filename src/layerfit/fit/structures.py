@@ -225,7 +225,10 @@ def _place(samples: Samples) -> np.ndarray:
 
 
 def effective(residuals: np.ndarray, place: np.ndarray) -> float:
-    """Effective number of residuals (n, 3) at places (n, 2): n over the sum of the correlations of one with all, times that of the channels."""
+    """Effective number of residuals (n, 3) at places (n, 2): n over the sum of the correlations of one with all, times that of the channels.
+    All of them where there is nothing left: nothing is alike."""
+    if not np.any(residuals):
+        return float(residuals.size)
     some = np.random.default_rng(0).permutation(len(residuals))[:PAIRED]
     z = residuals[some] / np.maximum(np.sqrt(np.mean(residuals[some] ** 2, 0)), 1e-300)
     distance = np.linalg.norm(place[some, None] - place[None, some], axis=-1)

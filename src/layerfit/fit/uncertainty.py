@@ -14,6 +14,10 @@ BLIND = 1e-6
 WEAK_SIGMA = 0.5
 """Sigma in the coordinate of the fit (a relative error, for most) above which a parameter is called not identifiable."""
 
+AGREEMENT = 3e-5
+"""In the coordinate of the fit: no sigma is below it. So near are two renderers that compute in float32, and no scatter of pixels tells of what
+all of them have in common."""
+
 GROUPS = 12
 """Parts of the image that the jackknife leaves out in turn."""
 
@@ -122,6 +126,7 @@ def spread(sums: Sums) -> Uncertainty:
     for gradient in sums.alike:
         step = newton(gram, gradient)
         covariance += np.outer(step, step)
+    covariance += AGREEMENT**2 * np.eye(n)
     return Uncertainty(covariance, blind, -newton(gram, np.sum(sums.part_gradients, 0)))
 
 

@@ -116,7 +116,7 @@ def _draw_scale(
     """The false colours from end to end, in a line, and the grey of what was not compared."""
     x, y = at
     bar = max(24, width // 3 - 20)
-    ramp, start, end = (SIGNED, "\N{MINUS SIGN}", f"+ {panel.scale}") if panel.signed else (RAMP, "0", panel.scale)
+    ramp, start, end = (SIGNED, "-", f"+ {panel.scale}") if panel.signed else (RAMP, "0", panel.scale)
     colours = np.repeat(false_colour(np.linspace(0.0, 1.0, bar), ramp)[None], 10, 0)
     draw.text((x, y - 3), start, fill=INK, font=font)
     canvas.paste(Image.fromarray((colours * 255.0 + 0.5).astype(np.uint8)), (x + 12, y))
