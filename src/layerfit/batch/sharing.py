@@ -29,10 +29,16 @@ def fitted(tasks: Mapping[str, Task], workers: int) -> Rows:
         yield from run_all(tasks)
         return
     left, tries = dict(tasks), dict.fromkeys(tasks, 0)
+    others = set(multiprocessing.active_children())
     while left:
         # Spawned: a process that has run JAX cannot be forked.
         with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=_begin_worker) as pool:
-            yield from _shared(pool, left, tries, workers)
+            try:
+                yield from _shared(pool, left, tries, workers)
+            except BrokenProcessPool:
+                # It ends its workers, but not one that was being started as another was killed, for which it would wait for ever.
+                for worker in set(multiprocessing.active_children()) - others:
+                    worker.terminate()
 
 
 def run_portion(tasks: dict[str, Task]) -> list[tuple[str, Row]]:
@@ -49,8 +55,8 @@ def portions(tasks: Mapping[str, Task], workers: int) -> Iterator[dict[str, Task
 
 
 def _shared(pool: Executor, left: dict[str, Task], tries: dict[str, int], workers: int) -> Rows:
-    """Rows until all are known, or a worker is killed: what was in hand then was tried. What was tried before goes first, and alone, so
-    that no scene is given up for what another does to its worker."""
+    """Rows until all are known, or a worker is killed, which is raised again: what was in hand then was tried. What was tried before goes first,
+    and alone, so that no scene is given up for what another does to its worker."""
     again = [{key: left[key]} for key in left if tries[key]]
     waiting = deque([*again, *portions({key: left[key] for key in left if not tries[key]}, workers)])
     running: dict[Future[list[tuple[str, Row]]], dict[str, Task]] = {}
@@ -72,6 +78,7 @@ def _shared(pool: Executor, left: dict[str, Task], tries: dict[str, int], worker
             if tries[key] == TRIES:
                 why = "its worker was killed twice, as by a machine out of memory; try fewer --workers"
                 yield [(key, failed(left.pop(key), why))]
+        raise
 
 
 def _begin_worker() -> None:
