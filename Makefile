@@ -27,8 +27,8 @@ lint: dev  ## style and types
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
-audit:  ## known vulnerabilities of the packages that layerfit runs on (needs uv, and asks pypi.org)
-	uv tool run pip-audit --disable-pip --require-hashes -r requirements/run.txt
+audit:  ## known vulnerabilities of the packages that layerfit runs on (needs uv, and asks pypi.org; no answer is a failure)
+	uv tool run pip-audit --strict --disable-pip --require-hashes -r requirements/run.txt
 
 lowest: dev  ## tests on the lowest versions that pyproject.toml allows (needs uv)
 	uv venv --quiet --clear .venv-lowest
