@@ -4,8 +4,10 @@ Few structures are compiled, each once; an example holds many materials and dire
 """
 
 import dataclasses
+import inspect
 import json
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -16,6 +18,7 @@ from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
 import layerfit as lf
+from drawn import FEW, MANY, ROWS, at, shares
 from helpers import QUICKLY
 from layerfit._directions import random_pairs
 from layerfit.preset import stack_of
@@ -34,29 +37,13 @@ COMPILED = (
 RECIPROCAL = {"conductor, anisotropic", "dielectric", "oren_nayar", "corrected, coat over lambert"}
 """What is reciprocal by its formula; `precise` is near to a walk, which is so in the mean."""
 
-ROWS = 64
-FEW = settings(max_examples=15, deadline=None, derandomize=True)
-MANY = settings(max_examples=200, deadline=None, derandomize=True)
-
 TURNED = 1e-9
 """Of a BRDF in float64, when its directions are turned: cosines of half vectors at grazing angles lose half of their digits."""
 
 
-@st.composite
-def shares(draw: Any, rows: int, columns: int) -> np.ndarray:
-    """Places in ranges, from end to end: a half of the numbers at one of them."""
-    inner = draw(arrays(float, (rows, columns), elements=st.floats(0.0, 1.0), fill=st.just(0.5)))
-    ends = draw(arrays(np.int8, (rows, columns), elements=st.integers(-1, 1), fill=st.just(0)))
-    return np.where(ends == 0, inner, 0.5 + 0.5 * ends)
-
-
 def materials(template: Any, places: np.ndarray, dtype: Any = float) -> Any:
     """A material a row, every number of it at its place in its range."""
-    columns = []
-    for free, place in zip(parameters(template), places.T, strict=True):
-        low, high = (float(free.to_steps(end)) for end in (free.spec.lower, free.spec.upper))
-        inner = np.asarray(free.from_steps(low + place * (high - low), np))
-        columns.append(np.clip(inner, free.spec.lower, free.spec.upper).astype(dtype))
+    columns = [at(free.spec, place).astype(dtype) for free, place in zip(parameters(template), places.T, strict=True)]
     return jax.tree.unflatten(jax.tree.structure(template), columns)
 
 
@@ -195,3 +182,65 @@ def test_light_is_linear(seed, scale, order):
 def test_a_word_finds_presets(word):
     for found in lf.shipped_presets(word):
         assert word.lower() in f"{found.name} {found.group} {found.structure} {found.description}".lower()
+
+
+@settings(FEW, max_examples=60)
+@given(arrays(np.float32, (12, 13, 3), elements=st.floats(0.0, 1e4, width=32)), st.integers(0, 155), st.floats(0.01, 100.0))
+def test_a_pixel_that_is_off_is_named(model, pixel, by):
+    """A picture is like itself, and the worst pixel of one that is not is told by its place."""
+    rows = model.reshape(-1, 3)
+    same = lf.check_image(rows, rows, np.arange(156), 13)
+    assert same.passed
+    assert same.max_rel == 0.0
+    broken = rows.copy()
+    broken[pixel] += by * (1.0 + rows.max())
+    other = lf.check_image(broken, rows, np.arange(156), 13)
+    assert not other.passed
+    assert (other.worst["x"], other.worst["y"]) == (pixel % 13, pixel // 13)
+
+
+ELSEWHERE = {
+    # files of any content
+    "inspect": "test_inspect",
+    "load": "test_measured",
+    "read_brdf": "test_hostile",
+    "read_scene": "test_hostile",
+    "read_start": "test_interchange",
+    "metal": "test_spectra",
+    # what takes seconds: known materials, and what is refused
+    "advise": "test_advise",
+    "choose_structure": "test_structures",
+    "choose_tier": "test_tiers",
+    "export_to": "test_interchange",
+    "fit": "test_fit",
+    "fit_batch": "test_batch",
+    "fit_map": "test_maps",
+    "fit_scene": "test_references",
+    "make_tier": "test_tiers",
+    "specialise": "test_specialise",
+    "structures_of": "test_structures",
+    "study": "test_study",
+    "tradeoff": "test_tradeoff",
+    # the shader beside JAX, on random and extreme pairs of every structure
+    "check_pairs": "test_printer",
+    "shade_samples": "test_printer",
+    # what is made of a result that is there
+    "live": "test_notebook",
+    "parameters": "test_references",
+    "plot_convergence": "test_shown",
+    "plot_plane": "test_shown",
+    "plot_study": "test_study",
+    "plot_tradeoff": "test_shown",
+    "use_compilation_cache": "test_cache",
+}
+"""Public functions that no property here is of, and the tests of each."""
+
+
+def test_every_public_function_is_tried():
+    """A new one has a property here, or is listed with where it is tried."""
+    here = Path(__file__)
+    functions = {name for name in lf.__all__ if inspect.isfunction(getattr(lf, name))}
+    tried = {name for name in functions if f"lf.{name}(" in here.read_text()}
+    assert functions - tried == set(ELSEWHERE)
+    for name, file in ELSEWHERE.items():
+        assert name in here.with_name(f"{file}.py").read_text()

@@ -82,7 +82,8 @@ def shade_samples(
 
 def check_image(image: np.ndarray, model: np.ndarray, index: np.ndarray, width: int) -> Parity:
     """Parity of an image's pixels (n, 3) with what JAX computed for them; `index` is their row-major place."""
-    floor = FLOOR * float(np.quantile(np.max(model, -1), 0.99))
+    white = float(np.quantile(np.max(model, -1), 0.99)) or 1.0  # a black picture has no white of its own
+    floor = FLOOR * white
     return compare(image, model, floor, lambda row: {"x": int(index[row] % width), "y": int(index[row] // width)})
 
 
