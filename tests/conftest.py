@@ -4,6 +4,8 @@ import ctypes
 import gc
 import importlib.util
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,17 +16,29 @@ import pytest
 from jax.extend import source_info_util
 
 from layerfit.__main__ import XLA_FLAGS
-from layerfit._compiled import fusion_emitters
+from layerfit._compiled import OPTIONS, fusion_emitters
 
 if TYPE_CHECKING:
     import moderngl
 
-# Tests compile much and compute little. What computes much, the fit and the walk, is compiled as its users have it.
+# Tests compile much and compute little: all is compiled quickly rather than well, but for modules marked `optimised`.
 # In one piece: what is cut up for threads takes a fifth more of the processor, and the tests have a process on each core.
 _FLAGS = ["--xla_backend_optimization_level=0", "--xla_disable_hlo_passes=call-inliner", XLA_FLAGS]
 _FLAGS += ["--xla_cpu_parallel_codegen_split_count=1"]
 _FLAGS += [f"--{name}=false" for name in fusion_emitters(newer=False)]
 os.environ.setdefault("XLA_FLAGS", " ".join(_FLAGS))
+_LEVEL = "xla_backend_optimization_level"
+_OPTIMISED = OPTIONS[_LEVEL]
+OPTIONS[_LEVEL] = 0
+
+# What is compiled for one test is read by all others of the run: those of another worker, and programs that tests start. The folder is made by
+# the process that starts the workers, and is theirs too.
+_COMPILED = None
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    _COMPILED = os.environ["JAX_COMPILATION_CACHE_DIR"] = tempfile.mkdtemp(prefix="layerfit-tests-")
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.1"
+jax.config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -45,6 +59,15 @@ MOST_MEMORY = 4.0e9
 """Bytes in memory above which what JAX keeps compiled is thrown away: a whole run would keep 6 GB."""
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _optimised(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What computes much, as some fits and the walk do, is compiled as its users have it. So is all that runs in a program of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.node.get_closest_marker("optimised"):
+            patch.setitem(OPTIONS, _LEVEL, _OPTIMISED)
+        yield
+
+
 @pytest.fixture(autouse=True)
 def _memory() -> Iterator[None]:
     yield
@@ -55,6 +78,11 @@ def _memory() -> Iterator[None]:
         # glibc keeps what was freed; without this the process would stay above, and throw all away after each test.
         if trim := getattr(ctypes.CDLL(None), "malloc_trim", None):
             trim(0)
+
+
+def pytest_unconfigure() -> None:
+    if _COMPILED:
+        shutil.rmtree(_COMPILED, ignore_errors=True)  # a program that is still ending may write to it
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

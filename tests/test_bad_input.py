@@ -17,6 +17,8 @@ import pytest
 from commands import SIDE, TRUTH, layerfit, process, snapshot, write_reference
 from layerfit.capture.exr import read_exr, write_exr
 
+pytestmark = pytest.mark.optimised
+
 MIDDLE = SIDE // 2
 
 

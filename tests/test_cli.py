@@ -23,6 +23,8 @@ from layerfit.preset import read_preset
 from layerfit.render import brdf
 from layerfit.shader.verify import check_image
 
+pytestmark = pytest.mark.optimised
+
 COMMANDS = (
     "fit",
     "structures",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sigma_coverage import MODELS, limits, noisy, pulls, row, shares, view_of
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.optimised]
 
 FITS = 100
 TRIED = ("phong", "corrected over lambert")

@@ -20,6 +20,8 @@ from layerfit.stack import Stack
 from layerfit.surfaces import Conductor
 from layerfit.walk import top_lobe, walk_rows
 
+pytestmark = pytest.mark.optimised
+
 TRUTH = {"coat.alpha": 0.12, "coat.eta": 1.5, "coat.tau": [0.08, 0.25, 0.7], "base.alpha": 0.2}
 MATERIAL = Stack((Coat(alpha=0.12, eta=1.5, tau=TRUTH["coat.tau"]),), Conductor(alpha=0.2, **COPPER), Corrected())
 START = Stack((Coat(alpha=0.2, eta=1.4, tau=[0.3, 0.3, 0.3]),), Conductor(alpha=0.3, **COPPER), Corrected())

@@ -10,7 +10,7 @@ from layerfit.capture.load import load
 from layerfit.fit.fit import fit
 from layerfit.fit.result import to_json
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.optimised]
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,8 @@ from layerfit.fit.residuals import initial
 from layerfit.fit.solve import NormalLevenbergMarquardt, columns, dense, descend, normal_equations, products, tangents
 from layerfit.fit.uncertainty import AGREEMENT, GROUPS, estimate
 
+pytestmark = pytest.mark.optimised
+
 SLOTS = ((0,), (1, 2, 3), (4,))
 RNG = np.random.default_rng(1)
 X = RNG.uniform(0.1, 2.0, 200)

@@ -24,6 +24,8 @@ from layerfit.structures import ANY, structures_of
 from layerfit.surfaces import CarPaint, Lambert
 from measured_files import write_table
 
+pytestmark = pytest.mark.optimised
+
 SOME = ["diffuse", "lobe", "coat_diffuse"]
 """Structures that are quick to compile."""
 

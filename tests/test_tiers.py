@@ -1,6 +1,7 @@
 """Other ways to print one material: their errors are true, their shaders are their own JAX functions, and they are as short as promised."""
 
 import dataclasses
+import functools
 
 import jax
 import numpy as np
@@ -52,32 +53,33 @@ ROUNDING = 2e-5
 """Of float32, in which tiers are evaluated here; their own errors are of float64."""
 
 
-@pytest.fixture(scope="module")
-def made():
-    """Compact tiers by their names, each made once."""
-    return {name: make_tier(stack, "compact", asked) for name, (stack, asked) in MATERIALS.items()}
+@functools.cache
+def made(name):
+    """The compact tier of one of the materials."""
+    stack, asked = MATERIALS[name]
+    return make_tier(stack, "compact", asked)
 
 
 @pytest.mark.parametrize("name", ["corrected, metal", "precise, diffuse"])
-def test_the_error_that_is_stated_is_true(made, name):
+def test_the_error_that_is_stated_is_true(name):
     stack, asked = MATERIALS[name]
     wi, wo = random_pairs(8192, seed=7)
     exact = np.asarray(jax.jit(brdf)(stack.astype(np.float64), wi.astype(float), wo.astype(float)))
-    error = np.abs(brdf_values(made[name].stack, wi, wo) - exact) / np.maximum(np.abs(exact), 1e-4 / np.pi)
-    assert error.max() <= 1.2 * made[name].error + ROUNDING
-    assert made[name].error <= asked
+    error = np.abs(brdf_values(made(name).stack, wi, wo) - exact) / np.maximum(np.abs(exact), 1e-4 / np.pi)
+    assert error.max() <= 1.2 * made(name).error + ROUNDING
+    assert made(name).error <= asked
 
 
 @pytest.mark.parametrize("name", MATERIALS)
-def test_the_shader_is_the_jax_function(gl, made, name):
-    shader = print_material(made[name].stack, "test")
+def test_the_shader_is_the_jax_function(gl, name):
+    shader = print_material(made(name).stack, "test")
     parity = check_pairs(shader, 16384)
     assert parity.passed, parity
-    assert f"within {made[name].error:.1e}" in shader.text()
+    assert f"within {made(name).error:.1e}" in shader.text()
 
 
-def test_the_exported_shader_draws_it_without_a_frame(gl, made):
-    stack = made["corrected, metal"].stack
+def test_the_exported_shader_draws_it_without_a_frame(gl):
+    stack = made("corrected, metal").stack
     text = print_material(stack, "test").text()
     assert "mat3" not in text
     lights = [(DISTANT, IRRADIANCE), (POINT, INTENSITY)]
@@ -86,8 +88,8 @@ def test_the_exported_shader_draws_it_without_a_frame(gl, made):
 
 @needs_tools
 @pytest.mark.parametrize("name", INSTRUCTIONS)
-def test_how_many_instructions(made, name):
-    assert 2 * 27 < instructions(print_material(made[name].stack, "test")).total <= INSTRUCTIONS[name]
+def test_how_many_instructions(name):
+    assert 2 * 27 < instructions(print_material(made(name).stack, "test")).total <= INSTRUCTIONS[name]
 
 
 @pytest.fixture(scope="module")
@@ -128,13 +130,13 @@ def test_tables_that_there_are_not():
         make_tier(MATERIALS["faithful, metal"][0], "tables", entries=1)
 
 
-def test_degrees_are_as_low_as_the_error_allows(made):
+def test_degrees_are_as_low_as_the_error_allows():
     stack, asked = MATERIALS["corrected, metal"]
     coarse = make_tier(stack, "compact", 30.0 * asked)
     degrees = lambda tier: {k: p.degree for k, p in vars(tier.stack.base).items() if hasattr(p, "degree")}  # noqa: E731
-    fine, rough = degrees(made["corrected, metal"]), degrees(coarse)
+    fine, rough = degrees(made("corrected, metal")), degrees(coarse)
     assert sum(rough.values()) < sum(fine.values()) - 3
-    assert made["corrected, metal"].error < coarse.error <= 30.0 * asked
+    assert made("corrected, metal").error < coarse.error <= 30.0 * asked
 
 
 @pytest.mark.parametrize(

@@ -38,9 +38,9 @@ def fusion_emitters(newer: bool) -> dict[str, Any]:
     return {"xla_cpu_use_fusion_emitters": newer} if jax.__version_info__ < (0, 11) else {}
 
 
-OPTIONS: Any = {"xla_disable_hlo_passes": "call-inliner"} | fusion_emitters(newer=False)
-"""Shading functions stay functions: inlined, they are fused to loops of a thousand operations, which LLVM no longer vectorises (two
-to four times slower). The newer emitters take up to twice as long to compile these."""
+OPTIONS: Any = {"xla_backend_optimization_level": 3, "xla_disable_hlo_passes": "call-inliner"} | fusion_emitters(newer=False)
+"""XLA's, where a function has none of its own. Shading functions stay functions: inlined, they are fused to loops of a thousand operations,
+which LLVM no longer vectorises (two to four times slower). The newer emitters take up to twice as long to compile these."""
 
 _POOL = ThreadPoolExecutor(2, "compile")
 
@@ -75,14 +75,14 @@ def _kept(path: Path) -> export.Exported | None:
 class Compiled:
     """A traced function with one executable for each structure and size of its arguments, made when it is first called."""
 
-    def __init__(self, fn: Callable[..., Any], optimise: int = 3, **options: Any):
+    def __init__(self, fn: Callable[..., Any], optimise: int | None = None, **options: Any):
         """Keyword arguments of `fn` are structure, not numbers.
 
-        `optimise`: 3 for what runs over pixels, 1 for what runs once a step, 0 for what runs once: it compiles sooner.
-        `options` are XLA's, beside `OPTIONS`.
+        `optimise`: 1 for what runs once a step, 0 for what runs once, as it compiles sooner; what runs over pixels has the level of `OPTIONS`.
+        `options` are XLA's, beside these.
         """
         self._fn = fn
-        self._options = OPTIONS | {"xla_backend_optimization_level": optimise} | options
+        self._options = ({} if optimise is None else {"xla_backend_optimization_level": optimise}) | options
         self._executables: dict[Any, tuple[Future[Any], Any]] = {}
 
     def begin(self, *args: Any, **static: Any) -> Any:
@@ -112,7 +112,7 @@ class Compiled:
             traced = self._traced(leaves, structure, static).trace(*leaves)
             lowered = traced.lower()
             CLOCK.trace_s += time.perf_counter() - start
-            self._executables[key] = _POOL.submit(lowered.compile, compiler_options=self._options), traced.out_info
+            self._executables[key] = _POOL.submit(lowered.compile, compiler_options=OPTIONS | self._options), traced.out_info
         return self._executables[key]
 
     def _traced(self, leaves: list[Any], structure: Any, static: dict[str, Any]) -> Any:
