@@ -13,12 +13,13 @@ from layerfit._fields import params
 from layerfit.layers import LAYERS
 from layerfit.render import brdf
 from layerfit.report import stability as report
-from layerfit.stability import exact, limits, measure, sweep
+from layerfit.stability import exact, limits, measure, sweep, tier
 from layerfit.stability.grid import CLOSE, POLAR_DEG, directions, grid, parameters
 from layerfit.stability.models import structures
 from layerfit.stack import FORMS, Stack
 from layerfit.surfaces import BASES, Lambert
 from layerfit.tiers.compact import compact
+from layerfit.tiers.tier import TIERS
 
 NARROW_BECKMANN = "conductor, distribution beckmann"
 
@@ -36,6 +37,32 @@ def test_every_layer_base_form_and_choice_is_tried():
             assert any(getattr(part, name) is not None for part in own), (cls, name)
         for field in dataclasses.fields(cls):
             assert {getattr(part, field.name) for part in own} >= set(field.metadata.get("choices", ())), (cls, field.name)
+    for form in FORMS:
+        for field in dataclasses.fields(form):
+            assert len({getattr(stack.form, field.name) for stack in stacks if type(stack.form) is form}) == 2, (
+                form,
+                field.name,
+            )
+
+
+def test_every_tier_is_tried():
+    names = structures()
+    by_formula = {name.partition(", tier ")[2] for name in names} - {""}
+    assert {"exact", "faithful", *by_formula, *tier.TIERS} == set(TIERS)
+    for base in ("conductor", "lambert"):
+        assert any(name.endswith(f"coat over {base}, tier schlick") for name in names)
+
+
+@pytest.mark.parametrize(("name", "kind"), [("corrected", "compact"), ("faithful", "compact"), ("faithful", "tables")])
+def test_tiers_have_derivatives(name, kind):
+    """Along turns of the directions: at the normal and in the mirror direction roots of 0 had none."""
+    stack = structures()[f"{name}, coat over conductor"]
+    tried = grid(stack, corners=2)
+    pairs = tuple(w.astype(np.float32) for w in directions()[:2])
+    found = tier.try_tier(kind, stack, tried, [tried.default], pairs, shaders=False)
+    assert found is not None
+    assert (found["materials"], found["not_finite"]) == (1, 0)
+    assert found["value_max"] < 1e-5
 
 
 def test_a_grid_holds_the_ends_of_all_ranges_and_what_is_close_to_them():
@@ -180,7 +207,7 @@ def test_a_base_that_is_not_seen_has_a_compact_tier():
 
 
 def test_an_interrupted_sweep_goes_on(monkeypatch, tmp_path):
-    effort, parts = sweep.Effort(corners=2, shaders=False, digits=0, compact=0), tmp_path / "parts.json"
+    effort, parts = sweep.Effort(corners=2, shaders=False, digits=0, tiers=0), tmp_path / "parts.json"
     tried = []
 
     def once(name, stack, effort):
@@ -200,14 +227,14 @@ def test_an_interrupted_sweep_goes_on(monkeypatch, tmp_path):
 
 
 def test_the_command_leaves_tables_and_maps(gl, tmp_path):
-    ran = layerfit("stability", "kubelka_munk, whole", "-o", tmp_path, "--corners", "4", "--digits", "1")
+    ran = layerfit("stability", "oren_nayar, form", "-o", tmp_path, "--corners", "4", "--digits", "1")
     assert ran.code == 0, ran.err
     document = json.loads((tmp_path / "stability.json").read_text())
     (entry,) = document["structures"]
     assert document["combinations"] == entry["materials"] * len(directions()[0])
     assert "none of the structures with findings" in " ".join(ran.err.split())
     assert (tmp_path / "stability.md").read_text().startswith(report.sentence(document))
-    assert (tmp_path / "heat" / "kubelka_munk_whole.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "heat" / "oren_nayar_form_qualitative.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_structure_that_is_not_there(tmp_path):

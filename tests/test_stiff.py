@@ -16,6 +16,8 @@ import pytest
 from helpers import COPPER, QUICKLY, STACKS, brdf, brdf_rows, direction
 from layerfit.forms.corrected import Corrected, edge_reflection, trapped_light
 from layerfit.forms.curves import absorbed
+from layerfit.forms.faithful import Faithful
+from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
 from layerfit.optics.flakes import exponential
 from layerfit.optics.fresnel import fresnel_conductor, fresnel_dielectric, transmittance_dielectric
@@ -266,6 +268,19 @@ def test_the_slope_at_matching_indices_is_that_beside_them():
     at = lambda eta: brdf_rows(Stack((Coat(alpha=0.1, eta=eta, tau=0.3),), Lambert(albedo=0.5), Corrected()), up, up)[0, 0]  # noqa: E731
     beside = (at(jnp.asarray(1.0 + 1e-6)) - at(jnp.asarray(1.0))) / 1e-6
     assert float(jax.grad(at)(jnp.asarray(1.0))) == pytest.approx(float(beside), rel=1e-3)
+
+
+@pytest.mark.parametrize("form", [None, Faithful(), Corrected(), Precise("single"), Precise("multi")])
+def test_nothing_jumps_where_total_reflection_begins(form):
+    """Below an index of .5 without extinction: from 30 degrees on all is reflected. Beside that the rest goes as a root."""
+    base = Conductor(alpha=0.2, eta=0.5, k=0.0)
+    stack = Stack((), base) if form is None else Stack((Coat(alpha=0.1, eta=1.5, tau=0.3),), base, form)
+    steps = np.array([1e-13, 1e-9, 1e-5])
+    theta = np.radians(30.0) + np.concatenate([-steps, steps])
+    wi = np.stack([np.sin(theta), np.zeros(6), np.cos(theta)], -1)
+    f = np.asarray(brdf_rows(stack, wi, wi * np.array([-1.0, 1.0, 1.0])))[:, 0]
+    across = np.abs(f[3:] - f[:3]) / f[:3]
+    assert np.all(across < 20.0 * np.sqrt(steps + 1e-12)), across  # the floor of no extinction
 
 
 def test_narrower_than_the_range_is_still_finite_in_single_precision():

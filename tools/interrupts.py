@@ -1,11 +1,11 @@
 """End commands at random moments: every file that is left is whole, and the same command given again ends as if nothing had been.
 
-    python tools/interrupts.py               120 moments, 24 of each command; exit code 1 where something was lost
+    python tools/interrupts.py               192 moments, 24 of each command; exit code 1 where something was lost
     python tools/interrupts.py fit batch -n 50 --seed 1
 
 Signals are SIGINT (Ctrl-C) and SIGKILL, by turns. Moments are drawn over the length of a run whose functions are compiled already. Of a run that
-was ended: no file that a reader refuses, none under another name, no process left behind; SIGINT gives one line and exit code 130. Of
-the run after it: all files, and the same bytes in those that two whole runs have the same.
+was ended: no file that a reader refuses, none under another name but what is kept to go on from, no process left behind; SIGINT gives one
+line and exit code 130. Of the run after it: all files, nothing that was kept, and the same bytes in those that two whole runs have the same.
 """
 
 import argparse
@@ -14,6 +14,7 @@ import io
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -23,7 +24,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+import xarray
 from PIL import Image
+
+from layerfit.capture.exr import read_exr, write_exr
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from commands import snapshot, write_reference
@@ -32,9 +37,14 @@ COMMANDS: dict[str, list[str]] = {
     "fit": ["fit", "scene.toml", "-o", "OUT", "--starts", "1"],
     "batch": ["batch", "*.toml", "-o", "OUT", "--quick", "--workers", "2"],
     "export": ["export", "lacquered_copper", "-o", "OUT/copper.frag"],
-    "stability": ["stability", "oren_nayar, form", "--corners", "2", "--no-shaders", "-o", "OUT"],
+    "map": ["map", "panel.toml", "-o", "OUT", "--size", "96", "--starts", "1"],
+    "study": ["study", "plan.toml", "-o", "OUT"],
+    "stability": ["stability", "dielectric, masking", "--corners", "2", "--no-shaders", "-o", "OUT"],
+    "tradeoff": ["tradeoff", "glass.json", "-o", "OUT", "--no-fits", "--rounds", "3"],
     "gallery": ["gallery", "wood", "-o", "OUT"],
 }
+KEPT = re.compile(r"(stability|tradeoff)\.parts\.json|\.tiles/[0-9a-f]{24}-[0-9]{5}\.npz")
+"""What a run that was ended may leave besides: parts that are done, which the next run goes on from and throws away."""
 PATIENCE = 120
 """Seconds within which all processes of a run that was ended are gone."""
 
@@ -51,7 +61,7 @@ class Ran:
 def whole(name: str, content: bytes) -> str | None:
     """Why a file is not whole; None for one that is."""
     reader = READERS.get(Path(name).suffix)
-    if reader is None or Path(name).name.startswith("."):
+    if reader is None or (not KEPT.fullmatch(name) and any(part.startswith(".") for part in Path(name).parts)):
         return "is none of what the command leaves"
     try:
         return None if reader(content) else "is not whole"
@@ -69,6 +79,22 @@ def _picture(content: bytes) -> bool:
     return content.endswith(b"IEND\xaeB`\x82")
 
 
+def _arrays(content: bytes) -> bool:
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        return len([arrays[name] for name in arrays]) > 0
+
+
+def _layers(content: bytes) -> bool:
+    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
+        file.write(content)
+        file.flush()
+        return len(read_exr(file.name).channels) > 0
+
+
+def _netcdf(content: bytes) -> bool:
+    return len(xarray.load_dataset(io.BytesIO(content)).data_vars) > 0
+
+
 READERS: dict[str, Callable[[bytes], bool]] = {
     ".json": lambda content: isinstance(json.loads(content), dict),
     ".jsonl": lambda content: content[-1:] in (b"", b"\n") and all(json.loads(line) for line in content.splitlines()),
@@ -80,6 +106,9 @@ READERS: dict[str, Callable[[bytes], bool]] = {
     ),
     ".md": lambda content: content.endswith(b"\n"),
     ".parquet": lambda content: len(content) > 8 and content[:4] == content[-4:] == b"PAR1",
+    ".npz": _arrays,
+    ".exr": _layers,
+    ".nc": _netcdf,
 }
 
 
@@ -120,7 +149,7 @@ class Trial:
         """What was lost by a signal at a moment, a share of the length of a run."""
         ended = self.run(out, moment * self.seconds, sent)
         yield from (f"{name} {why}" for name, content in ended.files.items() if (why := whole(name, content)))
-        yield from (f"{name} is none of its files" for name in ended.files.keys() - self.names)
+        yield from (f"{name} is none of its files" for name in ended.files.keys() - self.names if not KEPT.fullmatch(name))
         expected = {signal.SIGINT: (130, -signal.SIGINT), signal.SIGKILL: (-signal.SIGKILL,)}[
             signal.Signals(sent)
         ]  # before and after Python runs
@@ -131,6 +160,7 @@ class Trial:
         if again.code != self.code or "Traceback" in again.err or "Warning" in again.err:
             yield f"the run after it: exit code {again.code}: {again.err[-2000:]}"
         yield from (f"{name} is not there after another run" for name in self.names - again.files.keys())
+        yield from (f"{name} is left after another run" for name in again.files.keys() - self.names)
         yield from (
             f"{name} is another after another run" for name, content in self.same.items() if again.files.get(name) != content
         )
@@ -157,10 +187,56 @@ def interrupt(trial: Trial, count: int, seed: int) -> Iterator[str]:
             yield f"{trial.name}, {sent.name} after {moment * trial.seconds:.3f} s: {fault}"
 
 
+GLASS = {
+    "schema": "layerfit/preset",
+    "version": 1,
+    "name": "glass",
+    "base": {"type": "dielectric", "name": "base", "alpha": 0.2},
+}
+PLAN = """
+study = { free = ["base.alpha"], material = { base = { type = "conductor" } } }
+vary = { "base.alpha" = [0.1, 0.2, 0.4] }
+reference = { side = 16 }
+fit = { starts = 1 }
+"""
+LIGHT = """
+[[reference]]
+exr = "panel.exr"
+beauty = "light{k}"
+[[reference.light]]
+type = "directional"
+to_light = [{k}, 0, 1]
+irradiance_rgb = 3
+"""
+PANEL = """
+[camera]
+position = [0, 0, 4]
+look_at = [0, 0, 0]
+vfov_deg = 30
+[material]
+base = { type = "lambert" }
+[map]
+free = ["base.albedo"]
+"""
+
+
+def write_panel(folder: Path, side: int = 96) -> None:
+    """A flat panel under two lights, which takes two tiles of texels."""
+    row, column = np.mgrid[0:side, 0:side]
+    u, v = (column + 0.5) / side, 1.0 - (row + 0.5) / side
+    layers = {"P.X": 2.0 * u - 1.0, "P.Y": 2.0 * v - 1.0, "P.Z": 0.0 * u, "N.X": 0.0 * u, "N.Y": 0.0 * u, "N.Z": 0.0 * u + 1.0}
+    layers |= {"uv.U": u, "uv.V": v} | {f"light{k}.{c}": 0.2 + 0.3 * u * v for k in (0, 1) for c in "RGB"}
+    write_exr(folder / "panel.exr", layers)
+    (folder / "panel.toml").write_text("".join(LIGHT.format(k=k) for k in (0, 1)) + PANEL)
+
+
 def prepare(folder: Path) -> None:
     """What the commands read, and a compilation cache of their own."""
     scene = write_reference(folder)
     (folder / "second.toml").write_text(scene.read_text())
+    (folder / "glass.json").write_text(json.dumps(GLASS))
+    (folder / "plan.toml").write_text(PLAN)
+    write_panel(folder)
     os.environ["JAX_COMPILATION_CACHE_DIR"] = str(folder / "cache")
     os.environ.pop("LAYERFIT_NO_CACHE", None)
 

@@ -163,6 +163,19 @@ def _(primals: Any, tangents: Any) -> Any:
     return quotient, where(inside, (dx - quotient * dy) * inverse, 0.0)
 
 
+@jax.custom_jvp
+def divide(x: jax.Array, y: jax.Array) -> jax.Array:
+    """x / y, whose derivative holds no square of y: that is 0 in single precision long before y is."""
+    return x / y
+
+
+@divide.defjvp
+def _(primals: Any, tangents: Any) -> Any:
+    (x, y), (dx, dy) = primals, tangents
+    quotient = divide(x, y)
+    return quotient, (dx - quotient * dy) / y
+
+
 _power_p = Primitive("power")
 """x ** exponent of positive numbers and a constant exponent: `pow` in a shader. The library function that `lax.pow` becomes on a CPU takes
 one number at a time; exponential and logarithm, of which GLSL makes its own too, take a vector of them."""

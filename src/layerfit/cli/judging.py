@@ -145,9 +145,9 @@ def stability(
     digits: Annotated[
         int, typer.Option(min=0, max=1000, help="Materials of a structure that are compared with 50 digits (they need mpmath).")
     ] = Effort.digits,
-    compact: Annotated[
-        int, typer.Option(min=0, max=2, help="Materials of a structure whose compact tier is made.")
-    ] = Effort.compact,
+    tiers: Annotated[
+        int, typer.Option(min=0, max=2, help="Materials of a structure whose compact tier and tables are made.")
+    ] = Effort.tiers,
 ) -> Done:
     """Try every structure at the corners of its ranges and at grazing, normal, mirror and retro directions: do the numbers hold?
 
@@ -160,7 +160,7 @@ def stability(
     from ..report.stability import table
     from ..stability.sweep import stability_of
 
-    effort = Effort(corners, shaders, digits, compact, seed)
+    effort = Effort(corners, shaders, digits, tiers, seed)
     with progress() as report:
         document = stability_of(output, word, effort=effort, progress=report)
     show(table(document))

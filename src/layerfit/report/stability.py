@@ -94,12 +94,13 @@ _HEADINGS = (
     "beyond",
     "shader max",
     "compact",
+    "tables",
     "breaks",
 )
 
 
 def _cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
-    shader, compact = entry["shader"], entry["compact"]
+    shader = entry["shader"]
     broken = ", ".join(f"{told['kind']}: {told['parameter']}" for told in entry["breaks"]) or "-"
     value = entry["value_rel"]
     digits = [cell for key in ("float32", "float64") for cell in _digits(entry["digits"], key)]
@@ -112,7 +113,7 @@ def _cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
         str(entry["beyond"]),
         *digits,
         "-" if shader is None else _short(shader["max_rel"]),
-        "-" if not compact or not compact["materials"] else _short(compact["value_max"]),
+        *("-" if entry[tier] is None else _short(entry[tier]["value_max"]) for tier in ("compact", "tables")),
         broken,
     )
 
@@ -138,9 +139,9 @@ def table(document: Mapping[str, Any]) -> "Group":
     from rich.text import Text
 
     made = Table(header_style="dim", box=None, pad_edge=False)
-    chosen = [0, 2, 5, 8, 11, 14]
+    chosen = [0, 2, 5, 8, 11, 15]
     for k in chosen:
-        made.add_column(_TERMINAL.get(k, _HEADINGS[k]), justify="left" if k in (0, 14) else "right")
+        made.add_column(_TERMINAL.get(k, _HEADINGS[k]), justify="left" if k in (0, 15) else "right")
     for entry in document["structures"]:
         if not entry["good"]:
             cells = _cells(entry)

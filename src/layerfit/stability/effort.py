@@ -12,8 +12,8 @@ class Effort:
     shaders: bool = True
     digits: int = 4
     """Materials that are compared with 50 digits; none at 0."""
-    compact: int = 2
-    """Materials whose compact tier is made."""
+    tiers: int = 2
+    """Materials whose compact tier and tables are made."""
     seed: int = 0
 
 

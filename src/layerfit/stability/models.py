@@ -21,30 +21,49 @@ APART = (*WIDTHS, *THICKNESS, *FILM)
 COAT: dict[str, Any] = {"tau": 0.3}
 """A coat absorbs, unless it is left out on purpose."""
 
+BELOW = ("whole", "anisotropic", "filmed", "distribution beckmann")
+"""Kinds of a base that the forms treat each in a way of its own."""
+
 SHOWN_BY_FORMULA = ("conductor", "dielectric", "lambert", "torrance_sparrow")
 """Bases below a coat of short formulas for what facets reflect: each kind of reflectance, and none."""
 
 
 def structures() -> dict[str, Stack]:
-    """Materials by a name that says what they are: every base alone and below a coat in every form, every choice of a layer, two coats,
-    the tiers of short formulas, and what changes in time."""
+    """Materials by a name that says what they are: every base alone and below a coat in every form, every choice of a layer and of a form,
+    two coats, the tiers of short formulas, and what changes in time."""
     found: dict[str, Stack] = {}
-    for name, layer in _variants(BASES):
+    bases = dict(_variants(BASES))
+    for name, layer in bases.items():
         found[name] = Stack((), layer, Corrected())
-    for name, cls in BASES.items():
-        found |= _coated(f"coat over {name}", (Coat(**COAT),), cls())
+    for name, layer in bases.items():
+        if name in BASES or name.endswith(BELOW):
+            found |= _coated(f"coat over {name}", (Coat(**COAT),), layer)
     for name, layer in _variants({"coat": LAYERS["coat"]}, **COAT):
         if name != "coat":
             found |= _coated(f"{name} over conductor", (layer,), Conductor())
+    turned = Coat(alpha=None, alpha_x=0.3, alpha_y=0.1, **COAT)
+    found |= _coated("coat, anisotropic over conductor, anisotropic", (turned,), bases["conductor, anisotropic"])
     found |= _coated("milky coat over lambert", (Coat(tau_s=0.5, g=0.5),), Lambert())
     two = (Coat(**COAT), Coat(name="inner", alpha=0.2, eta=1.7, **COAT))
     for base in (Conductor(), Lambert()):
         found |= _coated(f"two coats over {_word(base)}", two, base)
     for name in ("coat over conductor", "coat over lambert"):
         found[f"precise multi, {name}"] = dataclasses.replace(found[f"precise, {name}"], form=Precise("multi"))
+    for name in ("corrected, coat over conductor", "faithful, coat over conductor", "corrected, milky coat over lambert"):
+        found |= {f"{name}, {words}": dataclasses.replace(found[name], form=form) for words, form in _options(found[name])}
     for name in [f"{form}, coat over {base}" for form in MODELS for base in SHOWN_BY_FORMULA]:
         found |= dict(_short_formulas(name, found[name])) if name in found else {}
     return found | dict(_in_time())
+
+
+def _options(stack: Stack) -> Iterator[tuple[str, Any]]:
+    """The form of a material with each of its options as it is not by default; of a milky coat, the one that is of scattering."""
+    for field in dataclasses.fields(stack.form):
+        now = getattr(stack.form, field.name)
+        others = [0] if field.name == "orders" else [not now] if isinstance(now, bool) else ["h" if now == "n" else "n"]
+        if (field.name == "multiple") == (stack.layers[0].tau_s is not None):
+            for other in others:
+                yield f"{field.name} {other}", dataclasses.replace(stack.form, **{field.name: other})
 
 
 def _short_formulas(name: str, stack: Stack) -> Iterator[tuple[str, Stack]]:

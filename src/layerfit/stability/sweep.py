@@ -26,7 +26,7 @@ from .exact import in_exact, judged
 from .grid import POLAR_DEG, Grid, directions, grid
 from .measure import Values, plain_values, slope_error, value_error, values_of
 from .models import structures
-from .tier import try_compact
+from .tier import TIERS, try_tier
 
 WORST = 10
 PARTS = "stability.parts.json"
@@ -71,7 +71,7 @@ def _document(found: list[dict[str, Any]], effort: Effort) -> dict[str, Any]:
     worst = sorted((case for entry in found for case in entry["worst"]), key=_over, reverse=True)[:WORST]
     return {
         "schema": "layerfit/stability",
-        "version": 2,
+        "version": 3,
         **dataclasses.asdict(effort),
         "polar_deg": list(POLAR_DEG),
         "combinations": sum(entry["combinations"] for entry in found),
@@ -94,20 +94,22 @@ def try_structure(name: str, stack: Stack, effort: Effort = USUAL) -> dict[str, 
     single, double = (values_of(tried.stack(stack, dtype), wi, wo, dtype) for dtype in (np.float32, np.float64))
     value, slope = value_error(single.f, double.f), slope_error(single, double, tried)
     breaks = limits.breaks(tried, plain_values(tried.stack(stack, np.float64, rounded=False), wi, wo))
-    made = try_compact(stack, tried, [tried.default, 0][: effort.compact], (wi, wo), effort.shaders) if effort.compact else None
+    rows = [tried.default, 0][: effort.tiers]
+    tiers = {tier: try_tier(tier, stack, tried, rows, (wi, wo), effort.shaders) if rows else None for tier in TIERS}
+    made = [found for found in tiers.values() if found]
     lost = sum(np.sum(~np.isfinite(part)) for part in (single.f, single.slopes, double.f, double.slopes, *single.gradients))
     entry = {
         "name": name,
         "parameters": [f.name for f in tried.free],
         "materials": len(tried.values),
-        "combinations": int(value.size) + (made["combinations"] if made else 0),
-        "not_finite": int(lost) + (made["not_finite"] if made else 0),
+        "combinations": int(value.size) + sum(found["combinations"] for found in made),
+        "not_finite": int(lost) + sum(found["not_finite"] for found in made),
         "beyond": beyond(single.f, double.f),
         "value_rel": _quantiles(value),
         "slope_rel": _quantiles(slope),
         "breaks": breaks,
         "shader": shader.printed(stack, tried, effort.seed) if effort.shaders else None,
-        "compact": made,
+        **tiers,
         "digits": _digits(stack, tried, (single, double), (value, slope.max(0)), effort) if effort.digits else None,
         "heat": {key: _heat(value[rows], polar) for key, rows in tried.lines.items()},
         "lines": {f.name: tried.values[tried.lines[f.name], k].tolist() for k, f in enumerate(tried.free)},

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import chunk, member, safe_power, static, struct
+from .._chunk import chunk, member, safe_power, safe_sqrt, static, struct
 from .._types import Colour, Scalar
 from ..forms import corrected
 from ..forms.crossing import cross
@@ -75,7 +75,7 @@ def corrected_way(
     T, width = energy[0], energy[1]
     bend, path = below[0], below[1]
     z2 = 1.0 - bend * bend * sin2
-    leaves = edge(jnp.sqrt(jnp.maximum(sin2, 0.0)))
+    leaves = edge(safe_sqrt(sin2))
     hidden = hidden_cosine(NoW, coat.alpha * coat.alpha)
     return CorrectedWay(NoW, sin2, hidden, bend, z2, jnp.sqrt(z2), T, width, path, leaves)
 

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import chunk, member, static, struct, where
+from .._chunk import chunk, divide, member, static, struct, where
 from .._types import Colour, Scalar
 from ..forms import faithful
 from ..layers import Coat
@@ -91,7 +91,7 @@ def faithful_top(coat: Coat, i: FaithfulWay, o: FaithfulWay, lean2: Scalar) -> F
     along = (eta2 * c + g) * (eta2 * c + g)
     rp = ((eta2 + 1.0) * quarter - 1.0) * across
     product = across * along
-    F = (along * along + rp * rp) * (0.5 * delta * delta) / (product * product)
+    F = divide((along * along + rp * rp) * (0.5 * delta * delta), product * product)
     a2 = coat.alpha * coat.alpha
     narrow = s2 / (lean2 + a2 * M2)
     V = 0.5 / (o.NoW * i.hidden + i.NoW * o.hidden)

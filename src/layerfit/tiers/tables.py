@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import fetch, static, struct, where
+from .._chunk import fetch, safe_sqrt, static, struct, where
 from .._types import Colour, Scalar
 from ..forms import faithful
 from ..layers import Coat
@@ -55,7 +55,7 @@ class Precomputed(Compact):
         row = looked_up(np.reshape(self.facets, (len(self.density), -1)), c)
         metal, F = colour_of(row), row[-1]
         V = 0.5 / (o.NoW * i.hidden + i.NoW * o.hidden)
-        lean = jnp.sqrt(lean2)
+        lean = safe_sqrt(lean2)
         top = F * V * self.facing(lean, M, s2, self.coat.alpha)
         left = (1.0 - F) * (1.0 - 4.0 * i.NoW * o.NoW * V * F)
         g = jnp.sqrt((self.coat.eta - 1.0) * (self.coat.eta + 1.0) + c * c)

@@ -9,7 +9,7 @@ import math
 
 import jax.numpy as jnp
 
-from .._chunk import chunk
+from .._chunk import chunk, divide
 from .._types import Scalar
 from ..layers import Coat
 
@@ -36,5 +36,5 @@ def coat_lobe(coat: Coat, NoL: Scalar, NoV: Scalar, hidden_l: Scalar, hidden_v: 
     rp = ((eta2 + 1.0) * quarter - 1.0) * across
     reflected = along * along + rp * rp
     ratio = ((coat.eta - 1.0) * (coat.eta + 1.0) * 0.5 / math.sqrt(math.pi) * coat.alpha) * s2
-    ratio = ratio / ((lean2 + (coat.alpha * coat.alpha) * M2) * (across * along))
+    ratio = divide(ratio, (lean2 + (coat.alpha * coat.alpha) * M2) * (across * along))
     return reflected * (ratio * ratio) / (NoV * hidden_l + NoL * hidden_v)
