@@ -5,6 +5,7 @@ traceback, and nothing on the disk that was not there before.
 import json
 import os
 import re
+import resource
 import shutil
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from unittest import mock
 import moderngl
 import numpy as np
 import pytest
+from interrupts import PLAN, write_panel
 
 from commands import SIDE, TRUTH, layerfit, process, snapshot, write_reference
 from layerfit.capture.exr import read_exr, write_exr
@@ -225,8 +227,22 @@ def test_a_loss_that_is_not_there(folder):
 def outputs(folder):
     """Commands that write, to a place yet to be named."""
     (folder / "d.csv").write_text("wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n0,0,1,0,0,1\n")
+    (folder / "plan.toml").write_text(PLAN)
+    write_panel(folder, side=8)
     scene, preset = folder / "scene.toml", folder / "truth.json"
     return {
+        "map": ["map", folder / "panel.toml", "-o"],
+        "study": ["study", folder / "plan.toml", "-o"],
+        "batch": ["batch", scene, "--quick", "-o"],
+        "stability": ["stability", "lambert", "--digits", "0", "-o"],
+        "tradeoff": ["tradeoff", preset, "-o"],
+        "specialise": ["specialise", preset, scene, "-o"],
+        "truth": ["truth", preset, "-o"],
+        "structures": ["structures", scene, "-o"],
+        "advise": ["advise", scene, "-o"],
+        "gallery": ["gallery", "wood", "-o"],
+        "view": ["view", preset, "-o"],
+        "blender-kit": ["blender-kit", "-o"],
         "fit": ["fit", scene, "-o"],
         "render": ["render", preset, scene, "-o"],
         "eval": ["eval", preset, folder / "d.csv", "-o"],
@@ -236,24 +252,28 @@ def outputs(folder):
     }
 
 
-WRITERS = ("fit", "render", "eval", "export", "verify", "demo")
+TO_FILES = ("render", "eval", "export", "view", "blender-kit")
+TO_DIRECTORIES = (
+    *("fit", "map", "study", "batch", "stability", "tradeoff", "specialise", "truth", "structures", "advise", "gallery"),
+    *("verify", "demo"),
+)
 
 
-@pytest.mark.parametrize("command", WRITERS)
+@pytest.mark.parametrize("command", [*TO_FILES, *TO_DIRECTORIES])
 def test_an_output_that_cannot_be_made(command, folder, gl):
     """Below a file: no user, root included, can make a directory there."""
     name = folder / "truth.json" / "deep" / "x.exr"
     refuses(folder, [*outputs(folder)[command], name], r"truth\.json", r"[Cc]hoose another")
 
 
-@pytest.mark.parametrize("command", ["fit", "verify", "demo"])
+@pytest.mark.parametrize("command", TO_DIRECTORIES)
 def test_a_file_where_a_directory_should_be(command, folder, gl):
     refuses(
         folder, [*outputs(folder)[command], folder / "truth.json"], r"truth\.json", r"is a file", r"another output directory"
     )
 
 
-@pytest.mark.parametrize("command", ["render", "eval", "export"])
+@pytest.mark.parametrize("command", TO_FILES)
 def test_a_directory_where_a_file_should_be(command, folder):
     (folder / "full.exr").mkdir()
     (folder / "full.exr" / "kept").write_text("kept")
@@ -294,18 +314,26 @@ def test_pixels_that_are_not_finite_are_left_out_and_counted(folder, gl):
 NO_DRIVER = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent.json", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
 
 
-@pytest.mark.parametrize("command", ["fit", "verify"])
+@pytest.mark.parametrize("command", ["fit", "verify", "map", "stability", "tradeoff"])
 def test_a_machine_without_a_gl_driver(command, folder):
+    more = outputs(folder)[command]
     before = snapshot(folder)
-    more = {"fit": [folder / "scene.toml", "-o", folder / "out"], "verify": [folder / "truth.json"]}[command]
     refused(
         folder,
-        process(command, *more, environment=NO_DRIVER),
+        process(*more, folder / "out", environment=NO_DRIVER),
         r"no OpenGL 3\.3 driver was found",
         r"egl: ",
         r"apt-get install .*libegl1 libgl1-mesa-dri",
     )
     assert snapshot(folder) == before
+
+
+@pytest.mark.parametrize("command", ["view", "gallery"])
+def test_pages_need_no_driver(command, folder):
+    ran = process(*outputs(folder)[command], folder / "new", environment=NO_DRIVER)
+    assert ran.code == 0, ran.err
+    page = folder / "new" / "index.html" if command == "gallery" else folder / "new"
+    assert page.read_bytes().rstrip().endswith(b"</html>")
 
 
 def test_a_driver_that_is_too_old(folder):
@@ -324,10 +352,11 @@ def test_a_driver_without_float_targets(folder, gl, monkeypatch):
     refuses(folder, ["verify", folder / "truth.json"], r"does not draw to float32 images", r"LIBGL_ALWAYS_SOFTWARE=1")
 
 
-def test_a_device_that_is_not_there(folder):
-    (folder / "d.csv").write_text("wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n0,0,1,0,0,1\n")
+@pytest.mark.parametrize("command", ["eval", "map", "study", "view"])
+def test_a_device_that_is_not_there(command, folder):
+    more = outputs(folder)[command]
     before = snapshot(folder)
-    ran = process("eval", folder / "truth.json", "d.csv", environment={"JAX_PLATFORMS": "cuda"}, cwd=folder)
+    ran = process(*more, folder / "new", environment={"JAX_PLATFORMS": "cuda"})
     refused(folder, ran, r"JAX does not find the device that JAX_PLATFORMS=cuda asks for", r"unset JAX_PLATFORMS")
     assert snapshot(folder) == before
 
@@ -352,6 +381,22 @@ def test_a_fault_ends_the_process_with_2_and_a_word(folder):
     ran = process("fit", "scene.toml", "-o", "out", cwd=folder)
     refused(folder, ran, r"^layerfit: scene\.toml: unknown key 'kamera' \(did you mean 'camera'\?\)\. Known keys: .*\n$")
     assert snapshot(folder) == before
+
+
+@pytest.mark.parametrize("command", ["map", "study", "tradeoff", "gallery", "view", "blender-kit"])
+def test_a_full_disk(command, folder, gl):
+    """No file of this process grows beyond 200 bytes, which the system says as it says that a disk is full."""
+    arguments = outputs(folder)[command]
+    before = snapshot(folder)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))
+    try:
+        ran = layerfit(*arguments, folder / "new")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    refused(folder, ran, r"cannot be written: (File too large|No space left on device)")
+    left = {name: content for name, content in snapshot(folder).items() if name not in before}
+    assert set(left.values()) <= {b""}, "half a file"
 
 
 def test_a_full_disk_leaves_the_old_results(folder, gl, monkeypatch):

@@ -23,12 +23,14 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray
 from PIL import Image
 
 from layerfit.capture.exr import read_exr, write_exr
+from layerfit.maps.kept import read_tile
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from commands import snapshot, write_reference
@@ -43,7 +45,7 @@ COMMANDS: dict[str, list[str]] = {
     "tradeoff": ["tradeoff", "glass.json", "-o", "OUT", "--no-fits", "--rounds", "3"],
     "gallery": ["gallery", "wood", "-o", "OUT"],
 }
-KEPT = re.compile(r"(stability|tradeoff)\.parts\.json|\.tiles/[0-9a-f]{24}-[0-9]{5}\.npz")
+KEPT = re.compile(r"(stability|tradeoff)\.parts\.json|\.tiles/[0-9a-f]{24}-[0-9]{5}\.tile")
 """What a run that was ended may leave besides: parts that are done, which the next run goes on from and throws away."""
 PATIENCE = 120
 """Seconds within which all processes of a run that was ended are gone."""
@@ -79,16 +81,16 @@ def _picture(content: bytes) -> bool:
     return content.endswith(b"IEND\xaeB`\x82")
 
 
-def _arrays(content: bytes) -> bool:
-    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-        return len([arrays[name] for name in arrays]) > 0
+def _in_a_file(read: Callable[[Path], Any]) -> Callable[[bytes], bool]:
+    """Of a reader of files."""
 
+    def reader(content: bytes) -> bool:
+        with tempfile.NamedTemporaryFile() as file:
+            file.write(content)
+            file.flush()
+            return read(Path(file.name)) is not None
 
-def _layers(content: bytes) -> bool:
-    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
-        file.write(content)
-        file.flush()
-        return len(read_exr(file.name).channels) > 0
+    return reader
 
 
 def _netcdf(content: bytes) -> bool:
@@ -106,8 +108,8 @@ READERS: dict[str, Callable[[bytes], bool]] = {
     ),
     ".md": lambda content: content.endswith(b"\n"),
     ".parquet": lambda content: len(content) > 8 and content[:4] == content[-4:] == b"PAR1",
-    ".npz": _arrays,
-    ".exr": _layers,
+    ".tile": _in_a_file(read_tile),
+    ".exr": _in_a_file(read_exr),
     ".nc": _netcdf,
 }
 

@@ -1,10 +1,12 @@
 """What is installed and what this machine can do; what each thing that is missing would give, and the one command that gets it."""
 
 import dataclasses
+import errno
 import platform
 import re
 import shutil
 import sys
+import tempfile
 import webbrowser
 from collections.abc import Iterator
 from importlib import metadata
@@ -156,6 +158,11 @@ def at_fault(error: Exception) -> MachineError | None:
         return MachineError(
             f"the Python package {error.name} cannot be imported ({error}), which this needs: "
             "pip install --force-reinstall layerfit. `layerfit doctor` says what else is missing."
+        )
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG):
+        # Results say which of them; what is left are files in between.
+        return MachineError(
+            f"a temporary file cannot be written: {error.strerror}. Make room in {tempfile.gettempdir()}, or name another directory in TMPDIR."
         )
     if "jax" in sys.modules and (reason := no_device()):
         return MachineError(f"{reason}. Take it away (unset JAX_PLATFORMS), or install what it needs: layerfit runs on a CPU.")

@@ -27,9 +27,11 @@ MAX_BYTES = 4 * 2**20
 def read_document(path: Path) -> dict[str, Any]:
     """A TOML (`.toml`) or JSON file as a table. Raises `InputError` with the place of the fault."""
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path}: {path.stat().st_size} bytes are too many for a scene file or a preset")
-        text = path.read_text(encoding="utf-8")
+        with path.open("rb") as file:  # not by its size, which that of a device does not say
+            content = file.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            raise InputError(f"{path}: more than {MAX_BYTES} bytes are too many for a scene file or a preset")
+        text = content.decode()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}. Check the path and its permissions.") from None
     except UnicodeDecodeError as error:

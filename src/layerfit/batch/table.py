@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
-from typing import Any, overload
+from typing import overload
 
 from ..documents import finite, one_writer, undisturbed, whole
 from ..errors import InputError
@@ -30,8 +30,8 @@ class Journal:
     def __init__(self, path: Path):
         self.path = path
         self._places: dict[str, tuple[int, bool]] = {}
-        for place, entry in _entries(path):
-            self._places[entry["key"]] = place, entry["row"]["error"] is None
+        for place, key, row in _entries(path):
+            self._places[key] = place, row["error"] is None
 
     def done(self, key: str) -> bool:
         """Whether a fit is there, and did not fail."""
@@ -81,13 +81,17 @@ class Rows(Sequence[Row]):
                 yield json.loads(file.readline())["row"]
 
 
-def _entries(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Lines of earlier runs, and where they begin. A line that was cut off in the writing is none."""
+def _entries(path: Path) -> Iterator[tuple[int, str, Row]]:
+    """Lines of earlier runs: where they begin, keys and rows. A line that was cut off in the writing, or spoilt since, is none."""
     place = 0
     with path.open("rb") if path.is_file() else contextlib.nullcontext([]) as lines:
         for line in lines:
-            with contextlib.suppress(ValueError):
-                yield place, json.loads(line)
+            entry = None
+            with contextlib.suppress(ValueError, RecursionError):
+                entry = json.loads(line)
+            match entry:
+                case {"key": str(key), "row": {"error": _} as row}:
+                    yield place, key, row
             place += len(line)
 
 

@@ -101,6 +101,15 @@ def _found(what: str) -> Iterator[tuple[Path, dict[str, str]]]:
 
 
 def _manifest(path: Path) -> Iterator[tuple[Path, dict[str, str]]]:
+    try:
+        yield from _rows(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}. Check the path and its permissions.") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: is not a CSV file in UTF-8 ({error})") from None
+
+
+def _rows(path: Path) -> Iterator[tuple[Path, dict[str, str]]]:
     with path.open(newline="", encoding="utf-8") as file:
         lines = csv.DictReader(file)
         if "scene" not in (lines.fieldnames or []):
@@ -110,4 +119,6 @@ def _manifest(path: Path) -> Iterator[tuple[Path, dict[str, str]]]:
         for line in lines:
             if None in line or None in line.values():
                 raise InputError(f"{path}: line {lines.line_num} should have {len(lines.fieldnames or [])} columns")
+            if "\0" in line["scene"]:
+                raise InputError(f"{path}: line {lines.line_num}: {line['scene']!r} is no name of a file")
             yield path.parent / line.pop("scene"), line

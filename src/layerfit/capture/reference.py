@@ -72,8 +72,8 @@ def _usable(reference: Reference, channels: Channels, min_cosine: float) -> Usab
     finite, mask = np.all(np.isfinite(channels.beauty), -1), _mask(reference.mask, (height, width))
     eye = np.asarray(reference.camera.position)
     if reference.geometry is None:
-        surface, tangent, uv = _surface(reference, channels)
-        return _compared(surface, tangent, uv, eye, reference.lights, min_cosine, finite, mask)
+        surface, tangent, uv, whole = _surface(reference, channels)
+        return _compared(surface, tangent, uv, eye, reference.lights, min_cosine, finite & whole, mask)
     if np.linalg.norm(eye - reference.geometry.center) <= reference.geometry.radius:
         raise InputError(f"{reference.exr}: the camera stands inside the sphere; check camera.position and geometry.radius")
     where = (
@@ -122,7 +122,7 @@ def _compared(
     view = normalise(eye - surface.position)
     reasons = {
         "not covered by the object": surface.covered,
-        "NaN or infinite": finite & np.all(np.isfinite(surface.normal), -1),
+        "NaN or infinite": finite,
         "masked": mask,
         f"seen at a grazing angle (cosine below {min_cosine:g})": min_cosine < np.sum(surface.normal * view, -1),
     }
@@ -179,24 +179,30 @@ def _unlit(reference: Reference) -> str:
     return f"{reference.exr}: no light reaches the visible side of the object; check where the lights in [[light]] are, and how bright"
 
 
-def _surface(reference: Reference, channels: Channels) -> tuple[Surface, np.ndarray | None, np.ndarray | None]:
-    """The surface as the file has it, its tangents and its texture coordinates."""
+def _surface(reference: Reference, channels: Channels) -> tuple[Surface, np.ndarray | None, np.ndarray | None, np.ndarray]:
+    """The surface as the file has it, its tangents and its texture coordinates; and where all of these are numbers, (H, W). Elsewhere they are 0."""
     if channels.normal is None or channels.position is None:
         missing = "normal" if channels.normal is None else "position"
         raise InputError(
             f'{reference.exr}: there is no {missing} channel and the scene gives no geometry. Render one, name it with {missing} = "..." '
             'under [reference], or give [geometry] kind = "sphere".'
         )
-    length = np.linalg.norm(channels.normal, axis=-1)
-    covered = length > 0.5
+    found = [channels.normal, channels.position, channels.tangent, channels.uv]
+    whole = np.all([np.isfinite(values).all(-1) for values in found if values is not None], 0)
+    normal, position = _numbers(channels.normal), _numbers(channels.position)
+    tangent, uv = (None if values is None else _numbers(values) for values in found[2:])
+    covered = np.linalg.norm(normal, axis=-1) > 0.5
     if channels.alpha is not None:
         covered &= channels.alpha > 1.0 - 1e-4
     else:
         # Without coverage, a pixel at a silhouette shows in its neighbours: some of them are empty.
         covered = _eroded(covered)
-    tangent = None if channels.tangent is None else channels.tangent.astype(float)
-    surface = Surface(channels.position.astype(float), normalise(channels.normal.astype(float)), covered)
-    return surface, tangent, None if channels.uv is None else channels.uv.astype(float)
+    return Surface(position, normalise(normal), covered), tangent, uv, whole
+
+
+def _numbers(image: np.ndarray) -> np.ndarray:
+    """Vectors of an image, 0 where they are none; in double precision no square of one overflows."""
+    return np.where(np.isfinite(image).all(-1, keepdims=True), image, 0.0).astype(float)
 
 
 def _eroded(mask: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..fit.fit import fit
 from ..fit.nuisances import THICKNESS
 from ..fit.parameters import Parametrisation, with_fixed
+from ..shader.gl import renderer
 from ..stack import Stack
 from .descent import Descent, Found
 from .files import written
@@ -53,12 +54,14 @@ def fit_map(
     those of the scene's [map]. `shared` are parameters that are alike in all texels and fitted to all images first; all others are as the
     scene's [material] says. `smooth` is by how much neighbours differ, one standard deviation in the coordinates of the fit (a part of the value,
     for most), for all parameters or by name; left out, neighbours know nothing of one another. `size` makes the map one of texture coordinates,
-    `size` x `size` texels; left out, a texel is a pixel. `starts` are tried in every texel. Raises `InputError` for a scene that cannot be mapped.
+    `size` x `size` texels; left out, a texel is a pixel. `starts` are tried in every texel. Raises `InputError` for a scene that cannot be
+    mapped, and with a directory `MachineError` where there is no OpenGL.
     """
     scene = scene if isinstance(scene, Scene) else read_scene(scene)
     directory = None if directory is None else Path(directory)
     if directory is not None:
         check_directory(directory)
+        renderer()  # a machine that cannot verify a shader is told so before the fits
     asked = scene.map
     free = asked.free if free is None else tuple(free)
     smooth, size = asked.smooth if smooth is None else smooth, asked.size if size is None else size

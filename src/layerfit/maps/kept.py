@@ -16,6 +16,7 @@ from ..preset import preset_of
 from .descent import Found
 
 FOLDER = ".tiles"
+DIGEST = hashlib.sha256().digest_size
 
 
 class Tiles:
@@ -30,18 +31,13 @@ class Tiles:
     def get(self, tile: int) -> Found | None:
         """What was found of a tile before."""
         path = self._path(tile)
-        if path is None or not path.is_file():
-            return None
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
-            return Found(**arrays)
+        return None if path is None or not path.is_file() else read_tile(path)
 
     def put(self, tile: int, found: Found) -> None:
         """Keep a tile. Raises `InputError` where it cannot be written."""
         path = self._path(tile)
         if path is not None:
-            content = io.BytesIO()
-            np.savez(content, **vars(found))
-            write_bytes(path, content.getvalue())
+            write_tile(path, found)
 
     def done(self) -> None:
         """Throw the files away: all of it stands in the maps."""
@@ -49,4 +45,21 @@ class Tiles:
             shutil.rmtree(self.directory, ignore_errors=True)
 
     def _path(self, tile: int) -> Path | None:
-        return None if self.directory is None else self.directory / f"{self.key}-{tile:05d}.npz"
+        return None if self.directory is None else self.directory / f"{self.key}-{tile:05d}.tile"
+
+
+def write_tile(path: Path, found: Found) -> None:
+    """A tile behind its digest: what a disk has spoilt is known before it is taken for numbers."""
+    content = io.BytesIO()
+    np.savez(content, **vars(found))
+    write_bytes(path, hashlib.sha256(content.getvalue()).digest() + content.getvalue())
+
+
+def read_tile(path: Path) -> Found | None:
+    """What stands in a file of `write_tile`; None where that is not what was written."""
+    content = path.read_bytes()
+    digest, arrays = content[:DIGEST], content[DIGEST:]
+    if hashlib.sha256(arrays).digest() != digest:
+        return None
+    with np.load(io.BytesIO(arrays), allow_pickle=False) as loaded:
+        return Found(**loaded)

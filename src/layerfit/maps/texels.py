@@ -163,6 +163,7 @@ class _Part:
 
 def _noise(target: np.ndarray, noise: np.ndarray) -> float:
     """c of the law c f^.7 by which a reference's noise grows, from the standard errors that its file states."""
+    target, noise = target.astype(float), noise.astype(float)  # the quotient of two float32 may be none
     known = np.isfinite(noise) & (noise > 0.0) & (target > 0.0)
     return float(np.median(noise[known] / target[known] ** NOISE_EXPONENT)) if known.any() else 0.0
 

@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..forms.precise import Precise
 from ..report import stability as report
 from ..report.told import Told
+from ..shader.gl import renderer
 from ..stack import Stack
 from ..study.kept import Kept
 from . import limits, shader
@@ -55,6 +56,8 @@ def sweep(
         )
     if effort.digits:
         numbers()
+    if effort.shaders:
+        renderer()
     kept = Kept(parts, [word, dataclasses.asdict(effort), sources().hex()]) if parts else None
     found = []
     for k, (name, stack) in enumerate(chosen.items()):

@@ -17,9 +17,9 @@ class Kept:
         if path.is_file():
             try:
                 found = json.loads(path.read_text(encoding="utf-8"))
-            except (json.JSONDecodeError, UnicodeDecodeError):
+            except (ValueError, RecursionError):
                 return  # not whole, so of no use
-            if isinstance(found, dict) and found.get("question") == self.question:
+            if isinstance(found, dict) and found.get("question") == self.question and isinstance(found.get("parts"), dict):
                 self.parts = found["parts"]
 
     def part(self, name: str, make: Callable[[], Any]) -> Any:
