@@ -54,13 +54,14 @@ def test_tilts_have_the_spread_that_they_say():
 
 @pytest.mark.parametrize(("dtype", "error"), [(np.float64, 1e-15), (np.float32, 2e-7)])
 def test_what_tilts_are_made_of_has_its_digits(dtype, error):
-    ends = 2.0 ** -np.arange(1.0, 24.0)
-    u = np.concatenate([np.linspace(0.0, 1.0, 4097)[1:-1], ends, 1.0 - ends]).astype(dtype)
-    exact = u.astype(float)
+    ends = 2 ** np.arange(24)
+    k = np.concatenate([np.arange(2**10, 2**24, 2**12), ends - 1, 2**24 - ends])
+    exact, bits, like = (k + 0.5) / 2**24, jnp.asarray(k * 256 + 37, jnp.uint32), jnp.zeros((), dtype)
     points = np.stack([np.cos(2.0 * np.pi * exact), np.sin(2.0 * np.pi * exact)], -1)
-    np.testing.assert_allclose(jax.vmap(circle)(jnp.asarray(u)), points, atol=error)
-    found = jax.vmap(exponential)(jnp.asarray(u), jnp.asarray(1.0 - u))
-    np.testing.assert_allclose(found, -np.log1p(-exact), rtol=error)
+    np.testing.assert_allclose(jax.vmap(lambda b: circle(b, like))(bits), points, atol=error)
+    found = np.asarray(jax.vmap(lambda b: exponential(b, like))(bits))
+    assert found.dtype == dtype
+    np.testing.assert_allclose(found, -np.log1p(exact - 1.0), rtol=error)
 
 
 def test_half_a_turn_takes_the_normal_of_a_flake_to_the_vertical():

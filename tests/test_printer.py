@@ -100,6 +100,8 @@ PRIMITIVES = {
     "and": (lambda a, b: jnp.where((a[0] > 0.0) & (b[0] > 0.0), a, b), UNIT, UNIT[::-1]),
     "or": (lambda a, b: jnp.where((a[0] > 0.0) | (b[0] > 0.0), a, b), UNIT, UNIT[::-1]),
     "xor": (lambda a: _pieces(_word(a) ^ (_word(a) * jnp.uint32(40503))), WIDE),
+    "bitcast_convert_type": (lambda a: _pieces(jax.lax.bitcast_convert_type(a[0], jnp.uint32)), WIDE),
+    "shift_left": (lambda a: _pieces(_word(a) << (_word(a) >> jnp.uint32(27)) | jnp.uint32(2)), WIDE),
     "shift_right_logical": (lambda a: _pieces((_word(a) + jnp.uint32(7)) >> jnp.uint32(5)), WIDE),
     "not": (lambda a, b: jnp.where(~(a[0] > b[0]), a, b), UNIT, UNIT[::-1]),
     "select_n": (lambda a, b: jnp.where(a[0] > 0.0, b, a), UNIT, UNIT[::-1]),

@@ -19,7 +19,6 @@ from layerfit.forms.curves import absorbed
 from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
-from layerfit.optics.flakes import exponential
 from layerfit.optics.fresnel import fresnel_conductor, fresnel_dielectric, transmittance_dielectric
 from layerfit.optics.growth import coverage, onset, partly_grown, tarnish_thickness
 from layerfit.optics.interface import drift, drift_scale, facet_tilt, second_facet, slope_spread, spread_lengthening, steer
@@ -200,7 +199,6 @@ CASES = {
     "partly_grown": (partly_grown, [(0.5, 0.5001, 1e-3), (0.2, 0.7, 0.1), (0.9, 0.1, 0.05)], USUAL),
     "onset": (onset, [(1e-6, 10.0, 1.5), (0.5, 10.0, 4.0), (0.999, 10.0, 0.5)], USUAL),
     "tarnish_thickness": (tarnish_thickness, [(9.0, 10.0, 0.5, 1e-3), (10.001, 10.0, 0.5, 1e-3), (1e3, 10.0, 0.5, 0.1)], USUAL),
-    "exponential": (exponential, [(0.3, 0.7), (0.001, 0.999)], USUAL),
 }
 """By name: the formula, numbers at which it is stiff, and the tolerance of its value in float32 and float64."""
 

@@ -159,84 +159,43 @@ uvec3 lf_hash_cell(vec2 cell, uint seed) {
     return lf_pcg3d(uvec3(i.x, i.y, seed));
 }
 
-// -log(1 - u) for u in (0, 1), with all digits at both ends; `complement` is 1 - u with its own.
-float lf_exponential(float u, float complement) {
-    bool small = complement < 1.5258789e-05;
-    float value = complement * 65536.0;
-    float x = small ? value : complement;
-    float halvings = small ? 16.0 : 0.0;
-    small = x < 0.00390625;
-    value = x * 256.0;
-    x = small ? value : x;
-    value = halvings + 8.0;
-    halvings = small ? value : halvings;
-    small = x < 0.0625;
-    value = x * 16.0;
-    x = small ? value : x;
-    value = halvings + 4.0;
-    halvings = small ? value : halvings;
-    small = x < 0.25;
-    value = x * 4.0;
-    x = small ? value : x;
-    value = halvings + 2.0;
-    halvings = small ? value : halvings;
-    small = x < 0.5;
-    value = x * 2.0;
-    x = small ? value : x;
-    value = halvings + 1.0;
-    halvings = small ? value : halvings;
-    small = x < 0.70710677;
-    value = x * 2.0;
-    x = small ? value : x;
-    value = halvings + 1.0;
-    halvings = small ? value : halvings;
-    bool near = u < 0.25;
-    value = x - 1.0;
-    float value2 = x + 1.0;
-    float value3 = 2.0 - u;
-    float s = (near ? (-u) : value) / (near ? value3 : value2);
+// -log u of a number in (0, 1), 24 of the bits, with all digits at both ends; in the precision of `like`.
+float lf_exponential(uint bits, float like) {
+    uint odd = (bits >> 7u) | 1u;
+    uint near = floatBitsToUint(float(odd));
+    uint halvings = (1278543090u - near) >> 23u;
+    float beyond_one = float(int(odd << halvings) - 33554432);
+    float s = beyond_one / (beyond_one + 6.7108864e+07);
     float s2 = s * s;
-    float total = 0.0 * s2 + 0.11111111;
-    total = total * s2 + 0.14285715;
-    total = total * s2 + 0.2;
+    float total = 0.14285715 * s2 + 0.2;
     total = total * s2 + 0.33333334;
     total = total * s2 + 1.0;
-    value = halvings * 0.6931472;
-    return (near ? 0.0 : value) - 2.0 * (s * total);
+    return abs(float(halvings) * 0.6931472) - 2.0 * (s * total);
 }
 
-// Point of the unit circle, u turns from (1, 0); u in [0, 1].
-vec2 lf_circle(float u) {
-    float quarter = floor(4.0 * u + 0.5);
-    float x = 6.2831855 * (u - 0.25 * quarter);
+// Point of the unit circle, u turns from (1, 0), u in (0, 1) by 24 of the bits; in the precision of `like`.
+vec2 lf_circle(uint bits, float like) {
+    uint odd = (bits >> 7u) | 1u;
+    uint quarter = (odd + 4194304u) >> 23u;
+    float x = float(int(odd - (quarter << 23u))) * 1.8725352e-07;
     float x2 = x * x;
-    float total = 1.0 - x2 / 90.0;
-    total = 1.0 - abs(x2 * total / 56.0);
-    total = 1.0 - abs(x2 * total / 30.0);
-    total = 1.0 - abs(x2 * total / 12.0);
-    total = 1.0 - abs(x2 * total / 2.0);
-    float total2 = 1.0 - x2 / 110.0;
-    total2 = 1.0 - abs(x2 * total2 / 72.0);
-    total2 = 1.0 - abs(x2 * total2 / 42.0);
-    total2 = 1.0 - abs(x2 * total2 / 20.0);
-    total2 = 1.0 - abs(x2 * total2 / 6.0);
-    float sine = x * total2;
-    bool odd = quarter == 1.0 || quarter == 3.0;
-    bool left = quarter == 1.0 || quarter == 2.0;
-    bool below = quarter == 2.0 || quarter == 3.0;
-    float across = odd ? sine : total;
-    float along = odd ? total : sine;
-    return vec2(left ? (-across) : across, below ? (-along) : along);
+    vec2 total = vec2(0.0013888889, 0.0001984127) - x2 * vec2(2.4801588e-05, 2.7557319e-06);
+    total = vec2(0.041666668, 0.008333334) - abs(x2 * total);
+    total = vec2(0.5, 0.16666667) - abs(x2 * total);
+    total = vec2(1.0) - abs(x2 * total);
+    float sine = x * total.y;
+    bool turned = (quarter & 1u) != 0u;
+    bool left = ((quarter + 1u) & 2u) != 0u;
+    bool below = (quarter & 2u) != 0u;
+    float across = turned ? sine : total.x;
+    float along = turned ? total.x : sine;
+    return vec2((left ? (-1.0) : 1.0) * across, (below ? (-1.0) : 1.0) * along);
 }
 
 // Tilt of the flake at texture coordinates uv; `per_uv` flakes lie along one unit of them.
 vec2 lf_flake_tilt(vec2 uv, float per_uv, float spread, uint seed) {
     uvec3 bits = lf_hash_cell(floor(uv * per_uv), seed);
-    float u = (float(bits.x >> 8u) + 0.5) * 5.9604645e-08;
-    float u2 = (float(~bits.x >> 8u) + 0.5) * 5.9604645e-08;
-    float exponent = lf_exponential(min(u, 0.99999994), min(u2, 0.99999994));
-    u = (float(bits.y >> 8u) + 0.5) * 5.9604645e-08;
-    return spread * sqrt(max(exponent, 0.0)) * lf_circle(min(u, 0.99999994));
+    return spread * sqrt(lf_exponential(~bits.x, per_uv)) * lf_circle(bits.y, per_uv);
 }
 
 // Part of the variance of tilts that is not drawn flake by flake: 1 - kept_tilt^2, with its own digits near by.
@@ -410,12 +369,12 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
 }
 
-// Density of the facet normals of a tilted flake: Beckmann's, moved in the plane of slopes (Olano and Baker 2010, eq. 7).
-float lf_tilted_d(vec3 h, vec2 tilt, float alpha) {
+// Density of a tilted flake's facet normals, their squared width alpha2: Beckmann's, moved among slopes (Olano and Baker 2010, eq. 7).
+float lf_tilted_d(vec3 h, vec2 tilt, float alpha2) {
     float x = h.x - h.z * tilt.x;
     float y = h.y - h.z * tilt.y;
     float inverse = 1.0 / (h.z * h.z);
-    return exp(-((x * x + y * y) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha));
+    return exp(-((x * x + y * y) / alpha2) * inverse) * (inverse * inverse) / (3.1415927 * alpha2);
 }
 
 // NoW (1 + 2 Lambda) of the Beckmann distribution (Heitz 2014, eq. 66, multiplied out).
@@ -515,7 +474,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     vec3 lobes2 = lobe / max(1.0 - q2, 1e-06);
     total = spread + 1.6817929 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
     total = total + pow(lf_colour.alpha, 1.5);
@@ -528,7 +487,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes2 = lobe + q2 * lobes2;
     total = spread + pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
     width = pow(total, 0.6666667);
@@ -539,7 +498,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, sqrt(alpha2)) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes2 = lobe + q2 * lobes2;
     vec3 f2 = f + throughput * directional * F2 * lobes2;
     vec3 albedo = (1.0 - lf_flakes.coverage) * lf_flakes.albedo;

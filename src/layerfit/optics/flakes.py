@@ -6,12 +6,15 @@ mapping (Olano and Baker 2010): a pixel that holds many flakes sees a Beckmann s
 """
 
 import math
+from typing import Any
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 
-from .._chunk import chunk, dot, safe_sqrt, where
+from .._chunk import chunk, dot, where
 from .._types import Scalar, UInt, Vec2, Vec3
-from .hashing import hash_cell, unit
+from .hashing import hash_cell
 from .microfacet import beckmann_by_slopes
 
 # A tilt that is off by a millionth moves the lobe of a narrow flake by a part of its width. So tilts are made of sums, products, quotients and
@@ -19,56 +22,68 @@ from .microfacet import beckmann_by_slopes
 # both at once, others one by one.
 
 
-def _rounded(product: Scalar) -> Scalar:
+def _rounded(product: Scalar | Vec2) -> Any:
     """A product >= 0 that is rounded before anything is added to it."""
     return jnp.abs(product)
+
+
+ODD = 25
+"""Bits of an odd whole number that stands for one in (0, 1), the middle of one of 2^24 parts: whole numbers keep all digits at both ends."""
+
+_HALVED = int(np.float32(2.0**ODD * math.sqrt(0.5)).view(np.uint32)) + 2**23 - 1
+"""Bits of the float below which such a number is to be doubled, and one short of a bit of its exponent."""
 
 
 @chunk
 def flake_tilt(uv: Vec2, per_uv: Scalar, spread: Scalar, seed: UInt) -> Vec2:
     """Tilt of the flake at texture coordinates uv; `per_uv` flakes lie along one unit of them."""
     bits = hash_cell(jnp.floor(uv * per_uv), seed)
-    # 1 - u by the complement of the bits: it would round to 0 for the steepest flakes.
-    exponent = exponential(unit(bits[0], per_uv), unit(~bits[0], per_uv))
-    return spread * safe_sqrt(exponent) * circle(unit(bits[1], per_uv))
+    # -log(1 - u) by the complement of the bits.
+    return spread * jnp.sqrt(exponential(~bits[0], per_uv)) * circle(bits[1], per_uv)
 
 
 @chunk
-def exponential(u: Scalar, complement: Scalar) -> Scalar:
-    """-log(1 - u) for u in (0, 1), with all digits at both ends; `complement` is 1 - u with its own."""
-    x, halvings = complement, jnp.zeros_like(u)
-    for k in (16, 8, 4, 2, 1, 0):
-        small = x < (2.0**-k if k else math.sqrt(0.5))
-        by = max(k, 1)
-        x = where(small, x * 2.0**by, x)
-        halvings = where(small, halvings + by, halvings)
-    near = u < 0.25
-    s = where(near, -u, x - 1.0) / where(near, 2.0 - u, x + 1.0)  # -log x = -2 artanh s, |s| < .172
-    s2, total = s * s, jnp.zeros_like(s)
-    for k in reversed(range(5 if u.dtype == jnp.float32 else 11)):
+def exponential(bits: UInt, like: Scalar) -> Scalar:
+    """-log u of a number in (0, 1), 24 of the bits, with all digits at both ends; in the precision of `like`."""
+    odd = odd_number(bits)
+    # Doubled until it lies between sqrt(1/2) and sqrt(2), by the exponent of a float.
+    near = jax.lax.bitcast_convert_type(odd.astype(jnp.float32), jnp.uint32)
+    halvings = (jnp.uint32(_HALVED) - near) >> jnp.uint32(23)
+    beyond_one = ((odd << halvings).astype(jnp.int32) - 2**ODD).astype(like.dtype)
+    s = beyond_one / (beyond_one + 2.0 ** (ODD + 1))  # -log u = -2 artanh s, |s| < .172
+    last = 3 if like.dtype == jnp.float32 else 10
+    s2, total = s * s, jnp.full_like(s, 1.0 / (2 * last + 1))
+    for k in reversed(range(last)):
         total = _rounded(total * s2) + 1.0 / (2 * k + 1)
-    return where(near, 0.0, _rounded(halvings * math.log(2.0))) - 2.0 * (s * total)  # twice is exact
+    return _rounded(halvings.astype(like.dtype) * math.log(2.0)) - 2.0 * (s * total)  # twice is exact
 
 
 @chunk
-def circle(u: Scalar) -> Vec2:
-    """Point of the unit circle, u turns from (1, 0); u in [0, 1]."""
-    quarter = jnp.floor(4.0 * u + 0.5)
-    x = 2.0 * math.pi * (u - 0.25 * quarter)  # an eighth of a turn at most
+def circle(bits: UInt, like: Scalar) -> Vec2:
+    """Point of the unit circle, u turns from (1, 0), u in (0, 1) by 24 of the bits; in the precision of `like`."""
+    odd = odd_number(bits)
+    quarter = (odd + jnp.uint32(2 ** (ODD - 3))) >> jnp.uint32(ODD - 2)
+    # An eighth of a turn at most.
+    x = (odd - (quarter << jnp.uint32(ODD - 2))).astype(jnp.int32).astype(like.dtype) * (2.0 * math.pi / 2**ODD)
     x2 = x * x
-    cosine, sine = _series(x2, 0), x * _series(x2, 1)
-    odd = (quarter == 1.0) | (quarter == 3.0)
-    left, below = (quarter == 1.0) | (quarter == 2.0), (quarter == 2.0) | (quarter == 3.0)
-    across, along = where(odd, sine, cosine), where(odd, cosine, sine)
-    return jnp.stack([where(left, -across, across), where(below, -along, along)])
+    # cos x and sin x / x: terms that fall.
+    *lower, total = [
+        jnp.array([1.0 / math.factorial(2 * k), 1.0 / math.factorial(2 * k + 1)], like.dtype)
+        for k in range(5 if like.dtype == jnp.float32 else 10)
+    ]
+    for term in reversed(lower):
+        total = term - _rounded(x2 * total)
+    cosine, sine = total[0], x * total[1]
+    turned = (quarter & jnp.uint32(1)) != 0
+    left = ((quarter + jnp.uint32(1)) & jnp.uint32(2)) != 0
+    below = (quarter & jnp.uint32(2)) != 0
+    across, along = where(turned, sine, cosine), where(turned, cosine, sine)
+    return jnp.stack([where(left, -1.0, 1.0) * across, where(below, -1.0, 1.0) * along])
 
 
-def _series(x2: Scalar, odd: int) -> Scalar:
-    """cos x, or sin x / x, for |x| < pi / 4: terms that fall, each from the one before."""
-    total = jnp.ones_like(x2)
-    for k in reversed(range(1, 6 if x2.dtype == jnp.float32 else 10)):
-        total = 1.0 - _rounded(x2 * total / ((2 * k + odd) * (2 * k + odd - 1)))
-    return total
+def odd_number(bits: UInt) -> UInt:
+    """2 k + 1 of the upper 24 bits k: u = (k + 1/2) / 2^24 times 2^25."""
+    return (bits >> jnp.uint32(7)) | jnp.uint32(1)
 
 
 @chunk
@@ -78,11 +93,11 @@ def tilted_normal(tilt: Vec2) -> Vec3:
 
 
 @chunk
-def tilted_d(h: Vec3, tilt: Vec2, alpha: Scalar) -> Scalar:
-    """Density of the facet normals of a tilted flake: Beckmann's, moved in the plane of slopes (Olano and Baker 2010, eq. 7)."""
+def tilted_d(h: Vec3, tilt: Vec2, alpha2: Scalar) -> Scalar:
+    """Density of a tilted flake's facet normals, their squared width alpha2: Beckmann's, moved among slopes (Olano and Baker 2010, eq. 7)."""
     x = h[0] - h[2] * tilt[0]
     y = h[1] - h[2] * tilt[1]
-    return beckmann_by_slopes((x * x + y * y) / (alpha * alpha), h[2], alpha * alpha)
+    return beckmann_by_slopes((x * x + y * y) / alpha2, h[2], alpha2)
 
 
 @chunk

@@ -104,6 +104,22 @@ def _convert(body: Any, eqn: Any, a: Value) -> Value:
     return a if kind == a.type else Value(f"{kind}({a.text})", kind, reads=a.reads)
 
 
+def _bits(body: Any, eqn: Any, a: Value) -> Value:
+    if (a.type, np.dtype(eqn.params["new_dtype"])) != ("float", np.uint32):
+        raise PrintError("bits are those of a float, as an unsigned number")
+    return Value(f"floatBitsToUint({a.text})", "uint", reads=a.reads)
+
+
+def _by_kind(of_truths: str, of_bits: str):
+    """An infix operator of truths, and of the bits of numbers."""
+
+    def write(body: Any, eqn: Any, a: Value, b: Value) -> Value:
+        operator = _operator(of_truths, LOGIC) if a.type == "bool" else _operator(of_bits, XOR, within=UNARY)
+        return operator(body, eqn, a, b)
+
+    return write
+
+
 def _negate(body: Any, eqn: Any, a: Value) -> Value:
     return Value(f"-{bracketed(a, UNARY, True)}", a.type, UNARY, a.reads)
 
@@ -177,10 +193,12 @@ PRIMITIVES: dict[str, Callable[..., Value]] = {
     "le": _comparison("<=", "lessThanEqual"),
     "eq": _comparison("==", "equal"),
     "ne": _comparison("!=", "notEqual"),
-    "and": _operator("&&", LOGIC),
-    "or": _operator("||", LOGIC),
+    "and": _by_kind("&&", "&"),
+    "or": _by_kind("||", "|"),
     "xor": _operator("^", XOR, within=UNARY),
     "shift_right_logical": _operator(">>", SHIFT, within=UNARY),
+    "shift_left": _operator("<<", SHIFT, within=UNARY),
+    "bitcast_convert_type": _bits,
     "not": lambda body, eqn, a: Value(f"{'!' if a.type == 'bool' else '~'}{bracketed(a, UNARY, True)}", a.type, UNARY, a.reads),
     "select_n": _select,
     "broadcast_in_dim": _passes,

@@ -73,7 +73,7 @@ class PaintLobe(Lobe):
         """Density of the facets of one flake: they lack the part of the spread that its tilt is drawn of."""
         whole = self.alpha * self.alpha
         own = whole * (1.0 - sparkle) + tilt.lost * (sparkle * whole)
-        return tilted_d(h, safe_sqrt(sparkle) * self.alpha * tilt.slope, safe_sqrt(widened_variance(own, added)))
+        return tilted_d(h, safe_sqrt(sparkle) * self.alpha * tilt.slope, widened_variance(own, added))
 
 
 def _ks(default: float | None) -> Any:

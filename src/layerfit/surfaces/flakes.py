@@ -150,7 +150,7 @@ class FlakeLobe(Lobe):
         alpha, sigma = self.paint.alpha, self.paint.sigma
         # Of a flake alone, and what coats add: the width of all flakes, less their spread, would have the digits of that.
         alpha2 = widened_variance(alpha * alpha + flake.lost * (sigma * sigma), added)
-        return tilted_d(h, flake.tilt, jnp.sqrt(alpha2)) * visibility("smith", "beckmann", wi, wo, width)
+        return tilted_d(h, flake.tilt, alpha2) * visibility("smith", "beckmann", wi, wo, width)
 
     def _in_its_frame(self, wi: Direction, wo: Direction, width: Width, flake: Flake) -> Scalar:
         """The lobe of a surface whose normal is that of the flake (Elek 2010): nothing where either direction is below it."""
