@@ -237,6 +237,41 @@ def test_values_for_a_table_of_directions(scene, tmp_path):
     assert (tmp_path / "v.csv").read_text() == ran.out
 
 
+def test_values_by_another_tier_and_by_the_random_walk(scene, tmp_path):
+    (tmp_path / "d.csv").write_text("wo_z,wi_x,wi_y,wi_z,wo_x,wo_y\n1,0,0,1,0,0\n0.6,0.8,0,0.6,-0.8,0\n0.6,0,0,-1,0.8,0\n")
+
+    def values(*options):
+        ran = layerfit("eval", "piano_black", tmp_path / "d.csv", *options)
+        assert ran.code == 0, ran.err
+        rows = list(csv.DictReader(io.StringIO(ran.out)))
+        return np.array([[float(row[name]) for name in list(rows[0])[6:]] for row in rows])
+
+    exact, compact, truth = (
+        values(),
+        values("--tier", "compact", "--max-error", "1e-3"),
+        values("--tier", "walk", "--paths", "2000"),
+    )
+    np.testing.assert_allclose(compact, exact, rtol=1e-3)
+    assert np.any(compact != exact)
+    assert truth.shape == (3, 6)
+    assert np.all(truth[2] == 0.0), "light from below"
+    off = np.abs(truth[:2, :3] - exact[:2])
+    assert np.all(off < 5.0 * truth[:2, 3:] + 0.03 * exact[:2])
+    assert np.all(truth[:2, 3:] > 0.0)
+    bare = tmp_path / "bare.json"
+    bare.write_text(json.dumps({key: value for key, value in TRUTH.items() if key != "layers"}))
+    assert layerfit("eval", bare, tmp_path / "d.csv", "--paths", "5").err.count("--paths is for --tier walk") == 1
+    refused = layerfit("export", bare, "--tier", "walk")
+    assert (refused.code, refused.out) == (2, "")
+    assert "no shader does the random walk" in refused.err
+    for name, options in (("walked.exr", ("--tier", "walk")), ("exact.exr", ())):
+        drawn = layerfit("render", bare, scene, *options, "-o", tmp_path / name)
+        assert drawn.code == 0, drawn.err
+    there, reference = (read_exr(tmp_path / name).channels["G"] for name in ("walked.exr", "exact.exr"))
+    assert np.max(reference) > 0.0
+    np.testing.assert_allclose(there, reference, rtol=1e-4, atol=1e-6)
+
+
 def test_no_directions_no_values(scene, tmp_path):
     (tmp_path / "d.csv").write_text("wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n")
     assert layerfit("eval", scene.parent / "truth.json", tmp_path / "d.csv").out.splitlines() == [

@@ -8,21 +8,22 @@ import numpy as np
 import pytest
 
 from helpers import COPPER, STACKS, needs_tools
-from layerfit._directions import random_pairs
+from layerfit._directions import random_pairs, random_places
 from layerfit.errors import InputError
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
-from layerfit.render import brdf, brdf_values
+from layerfit.render import brdf, brdf_values, predict
 from layerfit.shader.choose import choose_tier
 from layerfit.shader.cost import instructions
 from layerfit.shader.export import print_material
 from layerfit.shader.verify import check_pairs
 from layerfit.stack import Stack
-from layerfit.surfaces import Conductor, Lambert, OrenNayar
+from layerfit.surfaces import Conductor, Flakes, Lambert, OrenNayar
 from layerfit.tiers.polynomial import Curve
-from layerfit.tiers.tier import TIERS, make_tier
+from layerfit.tiers.tier import TIERS, WALK, make_tier
+from layerfit.walk import walked
 from test_export import DISTANT, INTENSITY, IRRADIANCE, POINT, agree, by_jax, drawn, with_lights
 
 LACQUER = Coat(alpha=0.1, eta=1.5, tau=[0.05, 0.2, 0.6])
@@ -36,6 +37,23 @@ MATERIALS = {
     "faithful, diffuse": (Stack((LACQUER,), PAPER, Faithful()), 1e-4),
     "faithful, clear and grey": (Stack((Coat(alpha=0.2, eta=1.4),), Conductor(alpha=0.3, eta=0.2, k=3.5), Faithful()), 1e-4),
     "corrected, clear and grey": (Stack((Coat(alpha=0.2, eta=1.4),), Conductor(alpha=0.3, eta=0.2, k=3.5), Corrected()), 1e-4),
+    "corrected, grooves": (Stack((LACQUER,), OrenNayar(albedo=[0.5, 0.3, 0.1], sigma=0.4), Corrected()), 1e-3),
+    "precise, grooves": (Stack((LACQUER,), OrenNayar(albedo=[0.5, 0.3, 0.1], sigma=0.4), Precise()), 1e-3),
+    "precise, short grooves": (
+        Stack((LACQUER,), OrenNayar(albedo=0.4, sigma=0.6, form="qualitative"), Precise()),
+        1e-3,
+    ),
+    "bare, film": (Stack((), Conductor(alpha=0.2, film_nm=300.0, film_eta=2.4, **COPPER)), 1e-3),
+    "corrected, flakes": (
+        Stack((LACQUER,), Flakes(alpha=0.1, sigma=0.2, coverage=0.6, albedo=[0.1, 0.2, 0.3], **COPPER), Corrected()),
+        1e-3,
+    ),
+    "corrected, Beckmann": (Stack((LACQUER,), Conductor(alpha=0.2, distribution="beckmann", **COPPER), Corrected()), 1e-3),
+    "corrected, two coats": (Stack((Coat(name="clear", alpha=0.1, eta=1.4), LACQUER), METAL, Corrected()), 1e-3),
+    "corrected, film": (
+        Stack((dataclasses.replace(LACQUER, film_nm=150.0, film_eta=2.1),), PAPER, Corrected()),
+        1e-3,
+    ),
     "precise, clear and grey": (Stack((Coat(alpha=0.2, eta=1.4),), Conductor(alpha=0.3, eta=0.2, k=3.5), Precise()), 1e-3),
 }
 
@@ -46,6 +64,14 @@ INSTRUCTIONS = {
     "corrected, diffuse": 100,
     "precise, metal": 330,
     "precise, diffuse": 112,
+    "corrected, grooves": 190,
+    "precise, grooves": 200,
+    "precise, short grooves": 155,
+    "corrected, film": 100,
+    "bare, film": 80,
+    "corrected, flakes": 355,
+    "corrected, Beckmann": 250,
+    "corrected, two coats": 330,
 }
 """At most, of the whole fragment shader with one light, after spirv-opt -O; Phong has 27."""
 
@@ -60,12 +86,15 @@ def made(name):
     return make_tier(stack, "compact", asked)
 
 
-@pytest.mark.parametrize("name", ["corrected, metal", "precise, diffuse"])
+@pytest.mark.parametrize("name", ["corrected, metal", "precise, diffuse", "precise, grooves", "corrected, flakes"])
 def test_the_error_that_is_stated_is_true(name):
     stack, asked = MATERIALS[name]
     wi, wo = random_pairs(8192, seed=7)
-    exact = np.asarray(jax.jit(brdf)(stack.astype(np.float64), wi.astype(float), wo.astype(float)))
-    error = np.abs(brdf_values(made(name).stack, wi, wo) - exact) / np.maximum(np.abs(exact), 1e-4 / np.pi)
+    place = random_places(8192, seed=7) if stack.reads else None
+    double = jax.tree.map(lambda a: a.astype(float), (wi, wo, place))
+    exact = np.asarray(jax.jit(brdf)(stack.astype(np.float64), *double))
+    values = predict(made(name).stack, wi[:, None], wo, np.ones((len(wi), 1, 3), np.float32), place)
+    error = np.abs(values - exact) / np.maximum(np.abs(exact), 1e-4 / np.pi)
     assert error.max() <= 1.2 * made(name).error + ROUNDING
     assert made(name).error <= asked
 
@@ -143,10 +172,18 @@ def test_degrees_are_as_low_as_the_error_allows():
     ("stack", "said"),
     [
         (STACKS["corrected, anisotropic"], "not isotropic GGX"),
-        (STACKS["corrected, three layers"], "one coat"),
+        (
+            Stack((LACQUER, dataclasses.replace(LACQUER, name="b"), dataclasses.replace(LACQUER, name="c")), METAL),
+            "more than two",
+        ),
+        (
+            Stack((LACQUER, dataclasses.replace(LACQUER, name="b")), METAL, Precise()),
+            "made for the corrected form, not the precise",
+        ),
+        (Stack((), PAPER), "no coat"),
         (Stack((LACQUER,), METAL, Faithful(refract_at="n")), "the faithful form as published"),
         (Stack((LACQUER,), OrenNayar(), Faithful()), "not the same from all sides"),
-        (Stack((LACQUER,), OrenNayar(), Corrected()), "its error stays at"),
+        (Stack((LACQUER,), PAPER, Precise()), "its error stays at"),
     ],
 )
 def test_what_has_no_compact_tier_says_why(stack, said):
@@ -165,6 +202,23 @@ def test_short_fresnel_formulas_and_the_faithful_form():
         make_tier(stack, "faithful", 1e-2)
     with pytest.raises(InputError, match="should be one of exact"):
         make_tier(stack, "compct")  # pyright: ignore[reportArgumentType]
+
+
+def test_the_random_walk_is_a_tier_to_evaluate():
+    """A bare surface is its own truth, and a coated one is what the nearest form says, but for noise."""
+    paper = Lambert(albedo=[0.5, 0.3, 0.1])
+    wi, wo = random_pairs(600, seed=3)
+    bare = walked(Stack((), paper), "bare")(wi, wo)
+    np.testing.assert_allclose(bare.mean, np.broadcast_to(np.array([0.5, 0.3, 0.1]) / np.pi, bare.mean.shape), rtol=1e-6)
+    assert not np.any(bare.se)
+    lacquered = walked(MATERIALS["precise, diffuse"][0], "lacquered", 20000)(wi[:40], wo[:40])
+    exact = brdf_values(MATERIALS["precise, diffuse"][0], wi[:40], wo[:40])
+    assert np.all(lacquered.se > 0.0)
+    assert np.median(np.abs(lacquered.mean - exact) / exact) < 0.02
+    with pytest.raises(InputError, match="too many for one command"):
+        walked(MATERIALS["precise, diffuse"][0], "lacquered", 10**9)(wi, wo)
+    with pytest.raises(InputError, match="no shader does the random walk: layerfit render and eval take --tier walk"):
+        make_tier(MATERIALS["precise, diffuse"][0], WALK)  # pyright: ignore[reportArgumentType]
 
 
 @needs_tools

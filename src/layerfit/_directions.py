@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from ._place import Place
+
 FLOOR = 1e-4
 """Values below this part of a lit white diffuse surface (for images: of white) are compared absolutely."""
 
@@ -27,3 +29,11 @@ def random_pairs(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     wo[:, 2] = np.maximum(np.abs(wo[:, 2]), 1e-4)
     wo /= np.linalg.norm(wo, axis=-1, keepdims=True)
     return wi.astype(np.float32), wo.astype(np.float32)
+
+
+def random_places(count: int, seed: int) -> Place:
+    """Texture coordinates over a few tiles, negative ones too, and distances from near to far, all shares of the sky; float32."""
+    rng = np.random.default_rng((seed, 1))
+    uv, distance = rng.uniform(-2.0, 2.0, (count, 2)), 10.0 ** rng.uniform(-2.0, 2.0, count)
+    sky = rng.uniform(0.0, 1.0, count)
+    return Place(*(a.astype(np.float32) for a in (uv, distance, sky)))

@@ -1,7 +1,7 @@
 """A material where references were seen: from JAX and from its shader, as pictures, and what sampling the lights costs in them."""
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from .report.comparison import Pair
 from .shader.export import Shader, print_material
 from .shader.verify import FLOOR, Parity, check_image, compare, shade_samples, together
 from .stack import Stack
+from .tabulate import Truth
 
 PICTURES = (".exr", ".png")
 """What a render is written as: linear, and for looking at."""
@@ -151,8 +152,10 @@ def _portions(view: View) -> Iterator[Samples]:
         yield view.samples(np.arange(start, min(start + size, len(view.index))), _directions(view))
 
 
-def write_render(stack: Stack, views: Sequence[AnyView], output: Path) -> list[Path]:
-    """Render a material in place of the references; one file a reference, numbered where there are several."""
+def write_render(
+    stack: Stack, views: Sequence[AnyView], output: Path, truth: Callable[[Stack], Truth] | None = None
+) -> list[Path]:
+    """Render a material in place of the references; one file a reference, numbered where there are several. With `truth` by the random walk."""
     if output.suffix not in PICTURES:
         raise InputError(f"{output}: a picture is written as .exr (linear) or .png; choose one of them with -o")
     check_directory(output.parent)
@@ -162,7 +165,8 @@ def write_render(stack: Stack, views: Sequence[AnyView], output: Path) -> list[P
         any_view.check(stack)
         path = output if len(views) == 1 else output.with_stem(f"{output.stem}_{k + 1}")
         thick = scaled(stack, view.scales(stack))
-        image = view.image(np.concatenate([predict(thick, *samples.arrays) for samples in _portions(view)]))
+        drawn = _predicted(thick, view) if truth is None else _walked(truth(thick), view)
+        image = view.image(drawn)
         if path.suffix == ".exr":
             path.parent.mkdir(parents=True, exist_ok=True)
             channels = {channel: image[..., c] for c, channel in enumerate("RGB")} | {"A": view.covered.astype(np.float32)}
@@ -171,6 +175,23 @@ def write_render(stack: Stack, views: Sequence[AnyView], output: Path) -> list[P
             write_bytes(path, pictures.plain(image, exposure(image, view.covered)))
         written.append(path)
     return written
+
+
+def _predicted(stack: Stack, view: View) -> np.ndarray:
+    """Linear pixels (n, 3) of a material."""
+    return np.concatenate([predict(stack, *samples.arrays) for samples in _portions(view)])
+
+
+def _walked(truth: Truth, view: View) -> np.ndarray:
+    """Linear pixels (n, 3) by the random walk, a pair of directions for every pixel and light."""
+    if not view.exact:
+        raise InputError(
+            "the tier walk is drawn under point and distant lights: for each direction of another light there were a walk of its own"
+        )
+    samples = view.samples()
+    pixels, lights, _ = samples.wi.shape
+    values = truth(samples.wi.reshape(-1, 3), np.repeat(samples.wo, lights, 0)).mean
+    return np.sum(values.reshape(pixels, lights, 3) * samples.weight, 1)
 
 
 def quadrature(result: FitResult) -> dict[str, Any] | None:

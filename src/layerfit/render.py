@@ -46,7 +46,7 @@ def shade(prepared: Any, wi: Any, wo: Any, weight: Any, place: Any = None, *, fo
 
     No channel depends on another: what they share is computed once, and the loops of the compiled code run over pixels.
     """
-    if getattr(prepared, "by_cosines", False):  # its curves hold the channels together
+    if getattr(prepared, "of_curves", False):  # they hold the channels together
         return jax.vmap(lambda *pixel: _pixel(form, prepared, *pixel), out_axes=1)(wi, wo, jnp.moveaxis(weight, 0, -1), place)
     colours = jax.tree.map(lambda value: 0 if jnp.shape(value) == (3,) else None, prepared)
 

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections.abc import Callable
 from pathlib import Path
 
 import jax
@@ -10,6 +11,12 @@ import numpy as np
 from .capture.measured.table import DIRECTIONS, VALUES, read_columns, unit_pairs
 from .render import brdf
 from .stack import Stack
+from .walk import Estimate
+
+Truth = Callable[[np.ndarray, np.ndarray], Estimate]
+"""What evaluates pairs of directions (n, 3) by the random walk."""
+
+ERRORS = ("se_r", "se_g", "se_b")
 
 
 def read_directions(path: Path) -> np.ndarray:
@@ -17,16 +24,20 @@ def read_directions(path: Path) -> np.ndarray:
     return unit_pairs(path, read_columns(path, DIRECTIONS)).reshape(-1, 6)
 
 
-def evaluate_table(stack: Stack, path: Path) -> str:
-    """The table with columns f_r, f_g, f_b [1/sr] added, as CSV text."""
+def evaluate_table(stack: Stack, path: Path, truth: Truth | None = None) -> str:
+    """The table with columns f_r, f_g, f_b [1/sr] added, as CSV text; with `truth` by the random walk, and standard errors se_r, se_g, se_b."""
     table = read_directions(path)
-    values = np.zeros((0, 3))
-    if len(table):
+    names = VALUES if truth is None else (*VALUES, *ERRORS)
+    values = np.zeros((0, len(names)))
+    if len(table) and truth is not None:
+        found = truth(table[:, :3], table[:, 3:])
+        values = np.column_stack([found.mean, found.se])
+    elif len(table):
         with jax.enable_x64(True):
             values = np.asarray(jax.jit(brdf)(stack.astype(np.float64), table[:, :3], table[:, 3:]))
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*DIRECTIONS, *VALUES])
+    writer.writerow([*DIRECTIONS, *names])
     for row, value in zip(table.tolist(), values.tolist(), strict=True):
         writer.writerow([*row, *(f"{v:.9g}" for v in value)])
     return out.getvalue()

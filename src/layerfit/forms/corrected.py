@@ -107,27 +107,32 @@ def evaluate(prepared: Prepared, wi: Direction, wo: Direction, options: Correcte
     lit = both_above(wi, wo)
     wi, wo = above(lit, wi), above(lit, wo)
     f = prepared.coats[0].evaluate(wi, wo)
-    below = _enter(None, wi, wo, prepared, options)
+    below = enter(None, wi, wo, prepared, options)
     for coat in prepared.coats[1:]:
         f = f + _bounced(coat, below, options)
-        below = _enter(below, wi, wo, prepared, options)
+        below = enter(below, wi, wo, prepared, options)
     for lobe in prepared.base.lobes:
         f = f + _bounced(lobe, below, options)
     if prepared.trapped is not None:
         f = f + below.throughput * below.directional * prepared.trapped
     if prepared.returned is not None:
-        reflected = prepared.base.diffuse.evaluate(below.i.w, below.o.w) * prepared.returned
-        if prepared.lobes is not None:
-            reflected = reflected * _by_lobes(prepared.lobes, below.R_i, below.i, below.tau)
-            reflected = reflected * _by_lobes(prepared.lobes, below.R_o, below.o, below.tau)
-        f = f + below.throughput * below.diffuse * reflected
+        f = f + diffuse_part(prepared, below)
     if prepared.coats[-1].tau_s is not None:
         f = f + below.throughput * _scattered(prepared, below, options)
     return where(lit, f, 0.0)
 
 
+def diffuse_part(prepared: Prepared, below: "Below") -> Colour:
+    """Light of the base that lost its direction [1/sr]."""
+    reflected = prepared.base.diffuse.evaluate(below.i.w, below.o.w) * prepared.returned
+    if prepared.lobes is not None:
+        reflected = reflected * _by_lobes(prepared.lobes, below.R_i, below.i, below.tau)
+        reflected = reflected * _by_lobes(prepared.lobes, below.R_o, below.o, below.tau)
+    return below.throughput * below.diffuse * reflected
+
+
 @dataclasses.dataclass(frozen=True)
-class _Below:
+class Below:
     """Light below `depth` coats, on its way to the next boundary: a plain record, so that nothing of it is printed."""
 
     depth: int
@@ -151,7 +156,7 @@ class _Below:
     """Facet width, spreads of the two directions and kind, of each interface passed."""
 
 
-def _enter(above: _Below | None, wi: Direction, wo: Direction, prepared: Prepared, options: Corrected) -> _Below:
+def enter(above: Below | None, wi: Direction, wo: Direction, prepared: Prepared, options: Corrected) -> Below:
     """Pass the next interface; wi and wo in air."""
     depth = above.depth if above else 0
     coat, interface = prepared.coats[depth], prepared.interfaces[depth]
@@ -170,7 +175,7 @@ def _enter(above: _Below | None, wi: Direction, wo: Direction, prepared: Prepare
         sin_o = safe_sqrt(sine2(wo))
         spreads = ()
         R_i, R_o = 1.0 - i.T, 1.0 - o.T
-    return _Below(
+    return Below(
         depth=depth + 1,
         n=interface.n,
         tau=coat.extinction,
@@ -194,7 +199,7 @@ def _reflected_above(T: Scalar, R: Colour, tau: Colour | None, cosine: Scalar) -
     return F + T * T * back / jnp.maximum(1.0 - F * back, 1e-6)
 
 
-def _bounced(target: Lobe, below: _Below, options: Corrected) -> Colour:
+def _bounced(target: Lobe, below: Below, options: Corrected) -> Colour:
     """Light of one lobe below coats: its first reflection, and the ever wider lobes of light sent back to it."""
     wi, wo = below.i.w, below.o.w
     if options.steer:
@@ -203,7 +208,7 @@ def _bounced(target: Lobe, below: _Below, options: Corrected) -> Colour:
     h = half_vector(wi, wo)
     F = target.reflectance(half_cosine(wi, wo))
     q = target.energy(F) * _returned(target, below, options) * below.directional
-    spread = _spread(target, below) if options.broaden else None
+    spread = spread_of(target, below) if options.broaden else None
     lobes: Any = 0.0
     for order in range(max(options.orders, 1), 0, -1):
         lobe = _shape(target, wi, wo, h, order, below, spread)
@@ -211,17 +216,17 @@ def _bounced(target: Lobe, below: _Below, options: Corrected) -> Colour:
     return below.throughput * below.directional * F * lobes
 
 
-def _shape(target: Lobe, wi: Direction, wo: Direction, h: Direction, order: int, below: _Below, spread: Width | None) -> Any:
+def _shape(target: Lobe, wi: Direction, wo: Direction, h: Direction, order: int, below: Below, spread: Width | None) -> Any:
     """The lobe of light that met `target` `order` times; `spread` is what the interfaces passed add to its width."""
     if spread is None:
         return target.shape(wi, wo, h, target.width)
-    width = _widened(target, order, below, spread)
+    width = widened(target, order, below, spread)
     if target.distribution != "beckmann":
         return target.shape(wi, wo, h, width)
     return target.widened(wi, wo, h, width, _added(target, order, below, spread))
 
 
-def _width_power(target: Lobe, below: _Below) -> float:
+def _width_power(target: Lobe, below: Below) -> float:
     """The power in which widths add to that of a lobe."""
     kinds = {target.distribution, *(kind for *_, kind in below.spreads)}
     return WIDTH_POWER[target.distribution] if len(kinds) == 1 else MIXED_POWER
@@ -232,7 +237,7 @@ def _by_lobes(lobes: Colour, R: Colour, crossing: Crossing, tau: Colour | None) 
     return 1.0 / jnp.maximum(1.0 - lobes * R * remains(tau, safe_divide(2.0, crossing.w[-1])), 1e-6)
 
 
-def _returned(target: Lobe, below: _Below, options: Corrected) -> Colour:
+def _returned(target: Lobe, below: Below, options: Corrected) -> Colour:
     """Part of the light leaving `target` that comes back to it."""
     R = 0.5 * (below.R_i + below.R_o)
     if not options.edge:
@@ -261,7 +266,7 @@ def _component(width: Width, axis: int) -> Scalar:
     return width[axis] if isinstance(width, tuple) else width
 
 
-def _spread(target: Lobe, below: _Below) -> Width:
+def spread_of(target: Lobe, below: Below) -> Width:
     """What the interfaces passed add to the width of every lobe, to the power in which widths add."""
     p = _width_power(target, below)
 
@@ -274,7 +279,7 @@ def _spread(target: Lobe, below: _Below) -> Width:
     return _per_axis([target.width, *(width for width, *_ in below.spreads)], along)
 
 
-def _grown(target: Lobe, order: int, below: _Below, spread: Width, axis: int, more: bool = False) -> Scalar:
+def _grown(target: Lobe, order: int, below: Below, spread: Width, axis: int, more: bool = False) -> Scalar:
     """Width, to its power, of the lobe of light that met `target` `order` times, and the interface above it in between; or what is `more`
     than its own."""
     p = _width_power(target, below)
@@ -286,7 +291,7 @@ def _grown(target: Lobe, order: int, below: _Below, spread: Width, axis: int, mo
     return total
 
 
-def _widened(target: Lobe, order: int, below: _Below, spread: Width) -> Width:
+def widened(target: Lobe, order: int, below: Below, spread: Width) -> Width:
     """Width of that lobe."""
     p = _width_power(target, below)
 
@@ -297,8 +302,8 @@ def _widened(target: Lobe, order: int, below: _Below, spread: Width) -> Width:
     return _per_axis([spread], along)
 
 
-def _added(target: Lobe, order: int, below: _Below, spread: Width) -> Width:
-    """What `_widened` adds to the variance of a Gaussian lobe: for those that know a small part of their own."""
+def _added(target: Lobe, order: int, below: Below, spread: Width) -> Width:
+    """What `widened` adds to the variance of a Gaussian lobe: for those that know a small part of their own."""
     p = _width_power(target, below)
 
     def along(axis: int) -> Scalar:
@@ -329,7 +334,7 @@ def trapped_light(lobe: Lobe, tau: Colour | None, n: Scalar) -> Colour:
     return where(critical > 1e-4, freed / jnp.maximum(1.0 - F0 * kept * t, 1e-6), 0.0)
 
 
-def _scattered(prepared: Prepared, below: _Below, options: Corrected) -> Colour:
+def _scattered(prepared: Prepared, below: Below, options: Corrected) -> Colour:
     """Light that the innermost coat scatters."""
 
     def way(crossing: Crossing, R: Colour) -> haze.Way:

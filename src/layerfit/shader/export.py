@@ -270,7 +270,7 @@ def _check_maps(stack: Stack, maps: Sequence[str], uniforms: Any) -> None:
             )
     if maps and uniforms:
         raise InputError("a shader with maps has its other values as constants: leave uniforms out")
-    if maps and COSINES in asks(stack):
+    if maps and _of_curves(stack):
         raise InputError(
             "a compact material is made of curves, in which no parameter is left to map: print the material itself"
         )
@@ -291,15 +291,28 @@ def _check_live(stack: Stack) -> None:
             )
 
 
+def _of_curves(stack: Stack) -> bool:
+    """Whether it is a compact material, made of polynomials and a few numbers."""
+    return not stack.layers and getattr(stack.base, "of_curves", False)
+
+
+def _by_field(name: str, value: Any) -> list[tuple[str, Any]]:
+    """The fields of a struct by their names, of structs of structs all, each a constant of its own."""
+    fields = [field.name for field in dataclasses.fields(value) if not field.metadata.get("static")]
+    parts: list[tuple[str, Any]] = []
+    for field in fields:
+        part = getattr(value, field)
+        nested = dataclasses.is_dataclass(part) and any(
+            dataclasses.is_dataclass(getattr(part, inner.name)) for inner in dataclasses.fields(part)
+        )
+        parts += _by_field(f"{name}_{field}", part) if nested else [(f"{name}_{field}", part)]
+    return [(name, part) for name, part in parts if part is not None]
+
+
 def _parts(stack: Stack, prepared: Any) -> list[tuple[str, Any]]:
     """The constants of a prepared material, by the names of the layers that they belong to, in the order of its leaves."""
-    if COSINES in asks(stack):
-        fields = [
-            (field.name, getattr(prepared, field.name))
-            for field in dataclasses.fields(prepared)
-            if not field.metadata.get("static")
-        ]
-        return [(f"{stack.base.name}_{name}", value) for name, value in fields if value is not None]
+    if _of_curves(stack):
+        return _by_field(stack.base.name, prepared)
     if prepared is None or not stack.layers:
         return [(stack.base.name, prepared)]
     parts: list[tuple[str, Any]] = []

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .._directions import FLOOR as FLOOR, random_pairs as random_pairs
+from .._directions import FLOOR as FLOOR, random_pairs as random_pairs, random_places as random_places
 from .._place import Place
 from ..documents import finite
 from ..render import predict
@@ -96,11 +96,3 @@ def check_pairs(shader: Shader, count: int = 65536, seed: int = 0) -> Parity:
     where = {name: getattr(place, name) for name in shader.stack.reads}
     describe = lambda row: {key: a[row].tolist() for key, a in {"wi": wi, "wo": wo, **where}.items()}  # noqa: E731
     return compare(values, model, FLOOR / np.pi, describe)
-
-
-def random_places(count: int, seed: int) -> Place:
-    """Texture coordinates over a few tiles, negative ones too, and distances from near to far, all shares of the sky; float32."""
-    rng = np.random.default_rng((seed, 1))
-    uv, distance = rng.uniform(-2.0, 2.0, (count, 2)), 10.0 ** rng.uniform(-2.0, 2.0, count)
-    sky = rng.uniform(0.0, 1.0, count)
-    return Place(*(a.astype(np.float32) for a in (uv, distance, sky)))

@@ -91,7 +91,7 @@ def runs(task: Task) -> Iterator[tuple[str, Callable[[], dict[str, Any]]]]:
     yield f"{most} pixels, 4 starts", lambda: _fitted(task, most, 4)
     for starts in STARTS:
         if starts != 4:
-            yield f"{most} pixels, {starts} starts", lambda starts=starts: _fitted(task, most, starts)
+            yield f"{most} pixels, {starts} start{'s' if starts > 1 else ''}", lambda starts=starts: _fitted(task, most, starts)
     for precision in ("float32", "float64"):
         for solver in SOLVERS:
             name = f"{solver}, {precision}"

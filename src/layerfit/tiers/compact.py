@@ -13,15 +13,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._directions import FLOOR as OF_WHITE, random_pairs
+from .._directions import FLOOR as OF_WHITE, random_pairs, random_places
+from .._place import narrowed
 from ..forms.corrected import Corrected
 from ..forms.faithful import Faithful
 from ..forms.precise import Precise
 from ..render import brdf
-from ..stack import Stack, evaluate
+from ..stack import Stack, at, evaluate
 from ..surfaces.diffuse import Lambert
+from ..surfaces.flakes import Flakes
 from ..surfaces.microfacet import Conductor
-from . import corrected_metal, diffuse, faithful, precise_metal, tables as precomputed
+from . import bare, corrected_metal, corrected_stack, diffuse, faithful, precise_metal, tables as precomputed
 from .polynomial import MOST
 from .surface import Compact, Recipe, noted, plain
 
@@ -37,29 +39,33 @@ MARGIN = (0.9, 0.7, 0.5)
 
 def refuses(stack: Stack) -> str | None:
     """Why a material has no compact tier, or None."""
-    if stack.reads:
+    coats, base, form = stack.layers, stack.base, stack.form
+    if not coats:
+        return None if _plain_metal(base) else f"it has no coat, and {base.name} is not an isotropic GGX metal"
+    if stack.reads and not isinstance(base, Flakes):
         return f"it varies over the surface by {', '.join(stack.reads)}"
-    if len(stack.layers) != 1:
-        return "it is made for one coat"
-    coat, base, form = stack.layers[0], stack.base, stack.form
     if isinstance(form, Faithful) and form != Faithful():
         return "it is made for the faithful form as published"
-    if not plain(coat):
-        return f"{coat.name} is not isotropic GGX with the exact reflectance, Smith's masking and no film"
-    if coat.tau_s is not None:
-        return f"{coat.name} scatters light"
-    if not base.lobes:
+    if odd := next((coat.name for coat in coats if not plain(coat)), None):
+        return f"{odd} is not isotropic GGX with the exact reflectance and Smith's masking"
+    if hazy := next((coat.name for coat in coats if coat.tau_s is not None), None):
+        return f"{hazy} scatters light"
+    if len(coats) == 1 and not base.lobes:
         lambertian = isinstance(base.diffuse, Lambert) or not isinstance(form, Faithful)
         return None if lambertian else f"{base.name} is not the same from all sides"
-    if (
-        not isinstance(base, Conductor)
-        or isinstance(base.width, tuple)
-        or (base.distribution, base.masking) != ("ggx", "smith")
-    ):
+    if isinstance(form, Corrected):
+        return "parts of the corrected form are left out, or added" if form != Corrected() else corrected_stack.refuses(stack)
+    if len(coats) > 1:
+        return f"of two coats it is made for the corrected form, not the {type(form).__name__.lower()} one"
+    if not _plain_metal(base):
         return f"{base.name} is neither diffuse nor an isotropic GGX metal"
-    if isinstance(form, Corrected) and form != Corrected():
-        return "parts of the corrected form are left out, or added"
     return None
+
+
+def _plain_metal(base: Any) -> bool:
+    """Whether it is an isotropic GGX metal."""
+    usual = isinstance(base, Conductor) and (base.distribution, base.masking) == ("ggx", "smith")
+    return usual and not isinstance(base.width, tuple)
 
 
 def compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
@@ -75,7 +81,9 @@ def tables(stack: Stack, max_error: float | None = None, entries: int | None = N
 
     It is of the faithful form. Without `entries` the tables have as few, a power of 2, as a `max_error` takes, or 256.
     """
-    paper = replace(stack, form=Faithful()) if stack.layers else stack
+    if not stack.layers:
+        return "it has no coat"
+    paper = replace(stack, form=Faithful())
     if reason := refuses(paper):
         return reason
     if not paper.base.lobes:
@@ -101,7 +109,7 @@ def largest_error(other: Stack, stack: Stack) -> float:
     """Largest relative error of a material against `stack`."""
     with jax.enable_x64(True):
         judge = _Judge(stack.astype(np.float64), 2)
-        return judge.compared(np.asarray(_exact(other.astype(np.float64), judge.wi, judge.wo)))
+        return judge.compared(np.asarray(_exact(other.astype(np.float64), judge.wi, judge.wo, judge.place)))
 
 
 def _compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
@@ -120,16 +128,21 @@ def _compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
         if error <= max_error:
             made = recipe.build({name: curve.fit(degrees[name]) for name, curve in recipe.curves.items()})
             error = max(error, fitted.error(_padded(recipe, degrees)))
-            form = type(stack.form).__name__.lower()
-            note = f"Compact tier of the {form} form: within {error:.1e} of it, relative, over random and extreme directions."
+            of = f"the {type(stack.form).__name__.lower()} form" if stack.layers else "a bare metal"
+            note = f"Compact tier of {of}: within {error:.1e} of it, relative, over random and extreme directions."
             return dataclasses.replace(stack, layers=(), base=noted(made, note)).astype(np.float32), error
     return f"its error stays at {error:.1e}, and {max_error:.1e} is asked for"
 
 
 def _recipe(stack: Stack) -> Recipe:
-    prepared, name = stack.prepare(), stack.base.name
+    prepared: Any = stack.prepare()
+    name = stack.base.name
+    if not stack.layers:
+        return bare.recipe(prepared, name)
     if isinstance(stack.form, Faithful):
         return faithful.recipe(prepared, name)
+    if len(stack.layers) > 1 or (stack.base.lobes and not _plain_metal(stack.base)):
+        return corrected_stack.recipe(prepared, name)
     if not stack.base.lobes:
         return diffuse.recipe(prepared, name, lambda prepared, wi, wo: evaluate(stack.form, prepared, wi, wo))
     return precise_metal.recipe(prepared, name) if isinstance(stack.form, Precise) else corrected_metal.recipe(prepared, name)
@@ -141,12 +154,16 @@ def _padded(recipe: Recipe, degrees: dict[str, int]) -> Compact:
 
 
 def _lowered(recipe: Recipe, full: dict[str, int], judge: "_Judge", max_error: float) -> dict[str, int]:
-    """Degrees as low as the error allows: those of the widest vectors, which cost most, first."""
+    """Degrees as low as the error allows: one less of each in turn, of the widest vectors first, which cost most."""
     degrees = dict(full)
     size = lambda name: np.size(recipe.curves[name].y[0])  # noqa: E731
-    for name in sorted(recipe.curves, key=size, reverse=True):
-        while degrees[name] > 1 and judge.error(_padded(recipe, degrees | {name: degrees[name] - 1})) <= max_error:
-            degrees[name] -= 1
+    left = sorted(recipe.curves, key=size, reverse=True)
+    while left := [name for name in left if degrees[name] > 1]:
+        for name in list(left):
+            if judge.error(_padded(recipe, degrees | {name: degrees[name] - 1})) <= max_error:
+                degrees[name] -= 1
+            else:
+                left.remove(name)
     return degrees
 
 
@@ -155,11 +172,13 @@ class _Judge:
 
     def __init__(self, stack: Stack, seed: int) -> None:
         self.wi, self.wo = (jnp.asarray(w, float) for w in random_pairs(PAIRS, seed))
-        self.exact = np.asarray(_exact(stack, self.wi, self.wo))
+        there = narrowed(random_places(PAIRS, seed), stack.reads)
+        self.place = jax.tree.map(lambda a: jnp.asarray(a, float), there)
+        self.exact = np.asarray(_exact(stack, self.wi, self.wo, self.place))
         self.scale = np.maximum(np.abs(self.exact), FLOOR)
 
     def error(self, made: Compact) -> float:
-        return self.compared(np.asarray(_values(made, self.wi, self.wo)))
+        return self.compared(np.asarray(_values(made, self.wi, self.wo, self.place)))
 
     def compared(self, values: np.ndarray) -> float:
         error = np.abs(values - self.exact) / self.scale
@@ -170,5 +189,5 @@ _exact = jax.jit(brdf)
 
 
 @jax.jit
-def _values(made: Compact, wi: Any, wo: Any) -> Any:
-    return jax.vmap(lambda i, o: jnp.broadcast_to(made.evaluate(i, o), (3,)))(wi, wo)
+def _values(made: Compact, wi: Any, wo: Any, place: Any) -> Any:
+    return jax.vmap(lambda i, o, there: jnp.broadcast_to(at(made, there).evaluate(i, o), (3,)))(wi, wo, place)

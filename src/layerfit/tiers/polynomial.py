@@ -12,6 +12,10 @@ from .._types import Scalar
 MOST = 10
 """Highest degree."""
 
+MIDDLE = 5
+"""Degree at which arguments are compared."""
+
+_CHEBYSHEV = np.polynomial.chebyshev
 _VECTOR = {2: vec2, 3: vec3, 4: vec4}
 
 
@@ -64,15 +68,29 @@ class Curve:
 
     def fit(self, degree: int, length: int = 0) -> Polynomial:
         """Least squares over Chebyshev's polynomials; `length` pads with coefficients of 0, for polynomials of one shape."""
-        chebyshev = np.polynomial.chebyshev
         low, high = float(self.x.min()), float(self.x.max())
-        rows = chebyshev.chebvander((2.0 * self.x - low - high) / (high - low), degree)
-        y = self.y.reshape(len(self.x), -1)
-        weight = np.broadcast_to(np.reshape(self.weight, (-1, 1)) if np.ndim(self.weight) == 1 else self.weight, y.shape)
         columns = []
-        for values, w in zip(y.T, weight.T, strict=True):
-            fitted = np.linalg.lstsq(rows * w[:, None], values * w, rcond=None)[0]
-            powers = chebyshev.Chebyshev(fitted, [low, high]).convert(kind=np.polynomial.Polynomial).coef
+        for fitted in self._series(degree)[1]:
+            powers = _CHEBYSHEV.Chebyshev(fitted, [low, high]).convert(kind=np.polynomial.Polynomial).coef
             columns.append(np.pad(powers, (0, max(degree + 1, length) - len(powers))))
         coefficients = np.stack(columns, -1)
         return Polynomial(*(coefficients[:, 0] if self.y.ndim == 1 else coefficients))
+
+    def off(self, degree: int) -> float:
+        """How far such a polynomial stays from the values at most, weighted."""
+        rows, fitted = self._series(degree)
+        y, weight = self._columns()
+        return float(np.max(np.abs((rows @ np.stack(fitted, -1) - y) * weight)))
+
+    def _columns(self) -> tuple[np.ndarray, np.ndarray]:
+        """Values and weights (n, k)."""
+        y = self.y.reshape(len(self.x), -1)
+        return y, np.broadcast_to(np.reshape(self.weight, (-1, 1)) if np.ndim(self.weight) == 1 else self.weight, y.shape)
+
+    def _series(self, degree: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Chebyshev's polynomials (n, degree + 1) at the arguments, and the coefficients of each column of values."""
+        low, high = float(self.x.min()), float(self.x.max())
+        rows = _CHEBYSHEV.chebvander((2.0 * self.x - low - high) / (high - low), degree)
+        y, weight = self._columns()
+        solved = [np.linalg.lstsq(rows * w[:, None], v * w, rcond=None)[0] for v, w in zip(y.T, weight.T, strict=True)]
+        return rows, solved

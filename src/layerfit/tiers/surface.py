@@ -3,18 +3,23 @@
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, get_args
 
 import jax.numpy as jnp
 import numpy as np
 
 from .._types import Colour, Scalar, Vec3
+from ..forms.curves import grazing
 from ..layers import Coat
 from ..surfaces.base import Surface
-from .polynomial import Curve, Polynomial
+from .polynomial import MIDDLE, Curve, Polynomial
 
 NODES = 400
 """Arguments that a curve is fitted at."""
+
+Argument = Literal["cosine", "facet", "root", "grazing"]
+"""What a polynomial of one direction is in: its cosine, that of the mean facet, the root of that as -1 to 1 (a power
+of a number about 0 keeps its digits), or what the precise form's curves are in."""
 
 
 class Compact(Surface):
@@ -22,8 +27,13 @@ class Compact(Surface):
 
     name: str
     note: str
-    by_cosines = True
-    """Its shader needs no frame: it takes NoL, NoV and how far the two directions lean apart."""
+    of_curves = True
+    """It is made of polynomials, which hold the channels together."""
+
+    @property
+    def by_cosines(self) -> bool:
+        """Whether its shader needs no frame: it takes NoL, NoV and how far the two directions lean apart."""
+        return True
 
     @abstractmethod
     def way(self, NoW: Scalar) -> Any:
@@ -61,12 +71,35 @@ def noted(made: Compact, note: str) -> Compact:
 def plain(coat: Coat) -> bool:
     """Whether a coat is of the kind that `coat_lobe` is made for."""
     usual = (coat.distribution, coat.masking, coat.fresnel) == ("ggx", "smith", "exact")
-    return usual and not isinstance(coat.width, tuple) and not coat.has_film
+    return usual and not isinstance(coat.width, tuple)
 
 
 def cosines() -> np.ndarray:
     """Cosines (n,) from grazing to the normal, without both, closer at the ends: where the curves of one direction are fitted at."""
     return 0.5 * (1.0 - np.cos(np.linspace(0.005, np.pi - 0.005, NODES)))
+
+
+def argument(name: Argument, NoW: Any, tilt: Any) -> Any:
+    """The argument of that name; `tilt` is the turn of the mean facet towards a grazing direction."""
+    if name in ("facet", "root"):
+        facet = jnp.sqrt(tilt + (1.0 - tilt) * (NoW * NoW))
+        return facet if name == "facet" else 2.0 * jnp.sqrt(facet) - 1.0
+    return grazing(NoW) if name == "grazing" else NoW
+
+
+def best_argument(NoW: np.ndarray, tilt: Any, y: np.ndarray, weight: Any) -> Argument:
+    """In which argument a polynomial comes nearest to values y at cosines."""
+    return min(get_args(Argument), key=lambda name: Curve(at(name, NoW, tilt), y, weight).off(MIDDLE))
+
+
+def at(name: Argument, NoW: np.ndarray, tilt: Any) -> np.ndarray:
+    """`argument` of many cosines."""
+    return np.asarray(argument(name, jnp.asarray(NoW), tilt))
+
+
+def half_root(s2: Any) -> Any:
+    """Argument of a film's curve: the root of the half cosine as -1 to 1, from four times its square."""
+    return jnp.sqrt(2.0 * jnp.sqrt(s2)) - 1.0
 
 
 def colour_of(values: Any) -> Any:

@@ -15,7 +15,11 @@ Name = Literal["exact", "compact", "lazanyi", "schlick", "faithful", "tables"]
 TIERS: tuple[Name, ...] = get_args(Name)
 """`exact`: the material's own form. `compact`: polynomials for what lies under the coat, fitted to it. `lazanyi` and `schlick`: short
 formulas for what a facet reflects. `faithful`: the form of Weidlich and Wilkie 2007. `tables`: that form with reflectances and densities read
-from tables, as Elek 2010. (Truth is the random walk, which no shader does.)"""
+from tables, as Elek 2010."""
+
+WALK = "walk"
+EVALUATED = (*TIERS, WALK)
+"""Those that a material can be evaluated by: with the truth, the random walk, which no shader does."""
 
 MOST_ENTRIES = 4096
 """Of a table: more would only be longer."""
@@ -48,6 +52,10 @@ def make_tier(stack: Stack, name: Name = "compact", max_error: float | None = No
 
     Raises `InputError` where the material has no such tier, or none within `max_error`.
     """
+    if name == WALK:
+        raise InputError(
+            "no shader does the random walk: layerfit render and eval take --tier walk; layerfit truth and tradeoff hold the others against it"
+        )
     if name not in TIERS:
         raise InputError(f"tier {name!r}: should be one of {', '.join(TIERS)}{nearest(name, TIERS)}")
     if max_error is not None and not max_error > 0.0:

@@ -6,12 +6,18 @@ nothing cancels: of s = l + v, |s|^2 = lean2 + (NoL + NoV)^2, and lean2 / |s|^2 
 """
 
 import math
+from dataclasses import fields, replace
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 
 from .._chunk import chunk, divide
-from .._types import Scalar
+from .._types import Colour, Scalar
 from ..layers import Coat
+from ..surfaces.film import Baked
+from .polynomial import Curve, Polynomial
+from .surface import half_root
 
 
 @chunk
@@ -38,3 +44,28 @@ def coat_lobe(coat: Coat, NoL: Scalar, NoV: Scalar, hidden_l: Scalar, hidden_v: 
     ratio = ((coat.eta - 1.0) * (coat.eta + 1.0) * 0.5 / math.sqrt(math.pi) * coat.alpha) * s2
     ratio = divide(ratio, (lean2 + (coat.alpha * coat.alpha) * M2) * (across * along))
     return reflected * (ratio * ratio) / (NoV * hidden_l + NoL * hidden_v)
+
+
+@chunk
+def filmed_lobe(
+    film: Polynomial, coat: Coat, NoL: Scalar, NoV: Scalar, hidden_l: Scalar, hidden_v: Scalar, lean2: Scalar
+) -> Colour:
+    """F D V of the coat's top with a film, by the polynomial of its reflectance."""
+    M = NoL + NoV
+    M2 = M * M
+    s2 = lean2 + M2
+    ratio = divide(coat.alpha * s2, lean2 + (coat.alpha * coat.alpha) * M2)
+    V = (0.5 / math.pi) / (NoV * hidden_l + NoL * hidden_v)
+    return film(half_root(s2)) * (ratio * ratio * V)
+
+
+def film_curve(coat: Coat) -> Curve:
+    """Reflectance of a coat's top with a film, by `half_root`."""
+    c = np.linspace(0.0, 1.0, 400) ** 2
+    F = np.asarray(jax.vmap(coat.reflectance)(jnp.asarray(c)))
+    return Curve(np.asarray(half_root(4.0 * c**2)), F)
+
+
+def without_film(coat: Coat) -> Coat:
+    """The coat without what is baked of its film, for which a polynomial stands."""
+    return replace(coat, **{field.name: None for field in fields(Baked)})

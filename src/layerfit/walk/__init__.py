@@ -15,4 +15,5 @@ from ._material import (
     interface_of as interface_of,
     refuses as refuses,
 )
+from ._tier import PATHS as PATHS, walked as walked
 from ._walk import Estimate as Estimate, begin as begin, top_lobe as top_lobe, walk as walk, walk_rows as walk_rows

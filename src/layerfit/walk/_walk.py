@@ -121,8 +121,8 @@ def begin(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
 
 
 def top_lobe(stack: Stack, wi: Any, wo: Any) -> np.ndarray:
-    """BRDF [1/sr] of the top interface alone, one reflection, (n, 3): `wi` (3,), `wo` (n, 3)."""
-    wi = jnp.asarray(wi, float)
+    """BRDF [1/sr] of the top interface alone, one reflection, (n, 3): `wi` (3,) or (n, 3), `wo` (n, 3)."""
+    wi = jnp.broadcast_to(jnp.asarray(wi, float), np.shape(wo))
     coat = stack.astype(wi.dtype).layers[0]
-    lobe = jax.vmap(lambda o: jnp.broadcast_to(coat.evaluate(wi, o), (3,)))(jnp.asarray(wo, wi.dtype))
+    lobe = jax.vmap(lambda i, o: jnp.broadcast_to(coat.evaluate(i, o), (3,)))(wi, jnp.asarray(wo, wi.dtype))
     return np.asarray(lobe)
