@@ -63,7 +63,7 @@ lock:  ## lock the packages that pyproject.toml names (needs uv); UPGRADE=--upgr
 	$(LOCK) $(UPGRADE) -c requirements/run.txt --group build -o requirements/build.txt
 	$(LOCK) $(UPGRADE) -c requirements/run.txt --group wheel -o requirements/wheel.txt
 	$(LOCK) $(UPGRADE) -c requirements/run.txt -c requirements/build.txt -c requirements/wheel.txt \
-		pyproject.toml --extra cluster --extra digits --extra interchange --extra metals --extra notebook --extra plot --extra study --extra table --group dev -o requirements/dev.txt
+		pyproject.toml --extra cluster --extra digits --extra interchange --extra metals --extra notebook --extra plot --extra study --extra table --extra window --group dev -o requirements/dev.txt
 
 clean:  ## remove what make made
 	rm -rf .venv .venv-wheel .venv-lowest dist out .pytest_cache .ruff_cache .hypothesis

@@ -46,7 +46,7 @@ TOP = [
     {"study"},
     {"report"},
     {"tabulate", "drawings", "job", "truth", "structures", "stability", "cache", "view", "doctor", "plot"},
-    {"batch", "tradeoffs", "specialising", "notebook"},
+    {"batch", "tradeoffs", "specialising", "notebook", "window"},
     {"maps", "study.sweep"},
     {"demo"},
     {""},
@@ -65,6 +65,7 @@ GATES = {
     "bpy": "interchange.kit",  # Blender runs it
     "MaterialX": "interchange.materialx",  # an extra
     "anywidget": "notebook.widget",  # an extra
+    "moderngl_window": "window.screen",  # an extra
     "matplotlib": "plot",  # an extra
     "xarray": "study.sweep",  # an extra
     "traitlets": "notebook.widget",

@@ -2,6 +2,7 @@
 
     python tools/screenshots.py            the report of a fit, the view of a preset, the gallery
     python tools/screenshots.py view       one of them
+    xvfb-run python tools/screenshots.py window    the window of a preset, on a display of its own
 
 Needs playwright and a Chromium; without a GPU, SwiftShader draws.
 """
@@ -94,7 +95,24 @@ def shots(path: Path, top: str) -> Iterator[Image.Image]:
             yield Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
+def window() -> Image.Image:
+    """The window of a preset, as its display has it."""
+    from layerfit.window import picture
+    from layerfit.window.screen import Screen
+
+    picture.SLOW_S = SECONDS  # all its pixels, on any machine
+    screen = Screen(lf.read_preset("lacquered_oak"), "lacquered_oak", Path())
+    for _ in range(PASSES):
+        screen.picture.advance()
+    screen.draw()
+    size = screen.window.buffer_size
+    return Image.frombytes("RGB", size, screen.window.fbo.read()).transpose(Image.Transpose.FLIP_TOP_BOTTOM)
+
+
 def write(name: str) -> None:
+    if name == "window":
+        window().save(IMAGES / "window.webp", quality=QUALITY, method=6)
+        return
     make, top = PAGES[name]
     with tempfile.TemporaryDirectory() as folder:
         path = make(Path(folder))
@@ -110,7 +128,7 @@ def write(name: str) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("page", nargs="*", metavar="|".join(PAGES))
+    parser.add_argument("page", nargs="*", metavar="|".join([*PAGES, "window"]))
     asked = parser.parse_args()
     for name in asked.page or PAGES:
         write(name)

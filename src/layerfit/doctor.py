@@ -23,6 +23,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "table": (("pyarrow",), "the table of a batch as Parquet, beside CSV"),
     "interchange": (("MaterialX",), "exported .mtlx files validated, and compiled to GLSL"),
     "notebook": (("anywidget",), "materials live in a notebook, with sliders (`lf.live`)"),
+    "window": (("moderngl_window",), "a preset to look at and tune in a window, without a browser (`layerfit view --window`)"),
     "digits": (("mpmath",), "what a value should be, to fifty digits (`layerfit stability`)"),
     "cluster": (("distributed",), "a batch on a cluster of dask (`layerfit batch --scheduler`)"),
     "study": (("xarray",), "what a study finds as a labelled array (`layerfit study`)"),

@@ -72,3 +72,18 @@ def sphere_uv(normal: np.ndarray, up: tuple[float, float, float]) -> np.ndarray:
 def sphere_tangent(normal: np.ndarray, up: tuple[float, float, float]) -> np.ndarray:
     """Tangents along the circles of latitude around `up`: the direction in which a lathe brushes."""
     return normalise(np.cross(np.asarray(up, float), normal))
+
+
+def sphere_mesh(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A unit sphere as triangles that face outwards: normals (n, 3), which are its positions, tangents (n, 3) along the circles of latitude around
+    +Y, texture coordinates (n, 2), and corners (m, 3)."""
+    v, u = np.meshgrid(np.linspace(0.0, 1.0, rows + 1), np.linspace(0.0, 1.0, columns + 1), indexing="ij")
+    theta, phi = np.pi * v, 2.0 * np.pi * (u - 0.5)
+    normal = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)], -1)
+    tangent = np.stack([np.cos(phi), 0.0 * phi, -np.sin(phi)], -1)
+    corner = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    below = corner + columns + 1
+    upper = np.stack([corner, below, corner + 1], -1)[columns:]  # one a segment at the poles, two between them
+    lower = np.stack([corner + 1, below, below + 1], -1)[:-columns]
+    uv = np.stack([u, v], -1)
+    return normal.reshape(-1, 3), tangent.reshape(-1, 3), uv.reshape(-1, 2), np.concatenate([upper, lower])

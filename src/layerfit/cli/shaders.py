@@ -169,10 +169,12 @@ def view(
     preset: Preset,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the page to this HTML file instead.")] = None,
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
+    window: Annotated[bool, typer.Option("--window", help="In a window of its own, without a browser.")] = False,
 ) -> Done:
     """Look at a preset live and tune it: its exported shader in the browser, with a slider for every parameter.
 
-    The page is served to this machine alone, until Ctrl+C; with `-o` it is a file to keep or to send. It can save the tuned preset.
+    The page is served to this machine alone, until Ctrl+C; with `-o` it is a file to keep or to send. It can save the tuned preset. With
+    `--window` (pip install 'layerfit[window]') a window has the same: drag, or move the sliders by keys.
 
     Example: `layerfit view lacquered_copper`
     """
@@ -180,13 +182,20 @@ def view(
 
     use_compilation_cache()
     from ..documents import write_text
+    from ..errors import InputError
     from ..preset import read_preset
     from ..view import page, serve
+    from ..window import show
 
     def ready(address: str) -> None:
         say(f"{preset.stem} is at {address} (Ctrl+C ends)")
         finish(Done({"address": address}, ("export", f"{preset.stem}.json")))
 
+    if window:
+        if output is not None:
+            raise InputError("--output is for the page: leave it out, or --window")
+        saved = show(read_preset(preset), preset.stem)
+        return Done({"saved": [str(path) for path in saved]}, ("export", saved[-1]) if saved else ())
     text = page(read_preset(preset), preset.stem)
     if output is None:
         serve(text, ready, open_browser)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..capture.geometry import sphere_mesh
 from ..errors import InputError
 from . import words
 from .convert import Conversion
@@ -64,10 +65,9 @@ def material(engine: Engine, name: str) -> dict[str, Any]:
 
 def _sphere(tangents: bool) -> dict[str, Any]:
     """Scene, mesh and buffer of a sphere with normals, which are its positions, and triangles."""
-    v, u = np.meshgrid(np.linspace(0.0, np.pi, RINGS + 1), np.linspace(0.0, 2.0 * np.pi, SEGMENTS + 1), indexing="ij")
-    normal = np.stack([np.sin(v) * np.sin(u), np.cos(v), np.sin(v) * np.cos(u)], -1).reshape(-1, 3).astype("<f4")
-    tangent = np.stack([np.cos(u), 0.0 * u, -np.sin(u), np.ones_like(u)], -1).reshape(-1, 4).astype("<f4")
-    triangles = _triangles()
+    normal, tangent, _, corners = sphere_mesh(RINGS, SEGMENTS)
+    normal, triangles = normal.astype("<f4"), corners.astype("<u2")
+    tangent = np.pad(tangent, ((0, 0), (0, 1)), constant_values=1.0).astype("<f4")
     low, high = normal.min(0).tolist(), normal.max(0).tolist()
     accessors: list[dict[str, Any]] = [
         {"componentType": 5126, "count": len(normal), "type": "VEC3", "min": low, "max": high},
@@ -92,15 +92,6 @@ def _sphere(tangents: bool) -> dict[str, Any]:
         ],
         "buffers": [{"byteLength": starts[-1], "uri": f"data:application/octet-stream;base64,{data}"}],
     }
-
-
-def _triangles() -> np.ndarray:
-    """Corners (n, 3) of the sphere's triangles: one a segment at the poles, two between them."""
-    corner = (np.arange(RINGS)[:, None] * (SEGMENTS + 1) + np.arange(SEGMENTS)).ravel()
-    below = corner + SEGMENTS + 1
-    upper = np.stack([corner, below, corner + 1], -1)[SEGMENTS:]
-    lower = np.stack([corner + 1, below, below + 1], -1)[:-SEGMENTS]
-    return np.concatenate([upper, lower]).astype("<u2")
 
 
 def read(path: Path, content: bytes) -> Engine:

@@ -12,8 +12,11 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from ..shader.export import HEADERS
+
 FOLDER = Path(__file__).parent / "page"
 VIEWER = ("packed.js", "program.js", "shapes.js", "renderer.js", "view.js", "run.js", "controls.js")
+STAGES = ("mesh.vert", "screen.vert", "add.frag", "show.frag")
 SCRIPTS = (*VIEWER, "compare.js", "gallery.js", "page.js")
 
 
@@ -32,13 +35,19 @@ def page(title: str, body: str, data: Mapping[str, bytes] | None = None) -> str:
     held = (
         f'<script type="text/plain" id="{escape(key)}">{_as_text(content)}</script>' for key, content in (data or {}).items()
     )
-    script = "\n".join(map(text, SCRIPTS)) if data else ""
+    script = "\n".join([shared(), *map(text, SCRIPTS)]) if data else ""
     return filled("frame.html", title=escape(title), style=text("page.css"), body=body, data="\n".join(held), script=script)
 
 
 def module(name: str) -> str:
     """The scripts of a viewer and a last one as an ES module; `STYLE` is theirs."""
-    return "\n".join([f"const STYLE = {json.dumps(text('page.css'))};", *map(text, (*VIEWER, name))])
+    return "\n".join([f"const STYLE = {json.dumps(text('page.css'))};", shared(), *map(text, (*VIEWER, name))])
+
+
+def shared() -> str:
+    """What windows draw with too, as a script: the stages of a picture as `GLSL`, by their files, and its lights as `STUDIO`."""
+    stages = {name: f"{HEADERS['essl300']}\n{text(name)}" for name in STAGES}
+    return f"const GLSL = {json.dumps(stages)};\nconst STUDIO = {json.dumps(json.loads(text('studio.json')))};"
 
 
 def as_json(document: Any) -> bytes:

@@ -227,12 +227,10 @@ def print_material(
 
         outside = [(leaf, f"{prefix}{name}") for leaf, name, _, _ in given]
     else:
-        with jax.enable_x64(False):
-            made = jax.tree.map(np.asarray, prepared(stack))
-        outside = [(part, f"{PREFIX}{name}") for name, part in _parts(stack, made)]
+        made, outside = _constants(stack)
         if uniforms:
             declarations = "".join(printer.uniform(name, part) for part, name in outside)
-            values = {name: leaf for part, root in outside for name, leaf in named_leaves(root, part)}
+            values = _named(outside)
         else:
             declarations = "\n".join(printer.constant(name, part) for part, name in outside)
             values = {}
@@ -252,6 +250,22 @@ def print_material(
     frame = template("cosines.glsl" if cosines else "brdf.glsl", shader.asks, shader.parameters)
     functions = "\n".join(part for part in (printer.structs_text(), declarations, printer.functions_text(), frame) if part)
     return dataclasses.replace(shader, functions=functions)
+
+
+def uniforms_of(stack: Stack) -> dict[str, np.ndarray]:
+    """Values of the uniforms of a shader that was printed with `uniforms="prepared"`, for a material of the same structure."""
+    return _named(_constants(stack.astype(jnp.float32))[1])
+
+
+def _constants(stack: Stack) -> tuple[Any, list[tuple[Any, str]]]:
+    """A prepared material, and its parts with their names in the shader."""
+    with jax.enable_x64(False):
+        made = jax.tree.map(np.asarray, prepared(stack))
+    return made, [(part, f"{PREFIX}{name}") for name, part in _parts(stack, made)]
+
+
+def _named(parts: Sequence[tuple[Any, str]]) -> dict[str, np.ndarray]:
+    return {name: leaf for part, root in parts for name, leaf in named_leaves(root, part)}
 
 
 def _check_maps(stack: Stack, maps: Sequence[str], uniforms: Any) -> None:

@@ -2,61 +2,6 @@
 // what it has drawn is copied to the canvas of the view that asked.
 
 const LIGHTS = 4;  // in one pass: the key light, and a point of each soft box
-const VERTEX = `#version 300 es
-precision highp float;
-layout(location = 0) in vec3 a_position;
-layout(location = 1) in vec3 a_normal;
-layout(location = 2) in vec3 a_tangent;
-layout(location = 3) in vec2 a_uv;
-uniform mat4 u_view_projection;
-out vec3 v_position;
-out vec3 v_normal;
-out vec3 v_tangent;
-out vec2 v_uv;
-void main() {
-    v_position = a_position;
-    v_normal = a_normal;
-    v_tangent = a_tangent;
-    v_uv = a_uv;
-    gl_Position = u_view_projection * vec4(a_position, 1.0);
-    gl_PointSize = 1.0;
-}`;
-const SCREEN = `#version 300 es
-void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }`;
-const ADD = `#version 300 es
-precision highp float;
-uniform highp sampler2D u_total;
-uniform highp sampler2D u_pass;
-out vec4 color;
-void main() { color = texelFetch(u_total, ivec2(gl_FragCoord.xy), 0) + texelFetch(u_pass, ivec2(gl_FragCoord.xy), 0); }`;
-// Passes are averaged over what they cover; outside of it the page shows through.
-const SHOW = `#version 300 es
-precision highp float;
-uniform highp sampler2D u_total;
-uniform float u_passes;
-uniform float u_exposure;
-uniform int u_tone;
-out vec4 color;
-vec3 neutral(vec3 c) {  // Khronos PBR Neutral tone mapper (2024): colours stay as they are up to 0.8
-    float x = min(c.r, min(c.g, c.b));
-    c -= x < 0.08 ? x - 6.25 * x * x : 0.04;
-    float peak = max(c.r, max(c.g, c.b));
-    if (peak < 0.76) return c;
-    float d = 1.0 - 0.76;
-    float next = 1.0 - d * d / (peak + d - 0.76);
-    return mix(c * next / peak, vec3(next), 1.0 - 1.0 / (0.15 * (peak - next) + 1.0));
-}
-vec3 filmic(vec3 c) {  // fit to the ACES curve (Narkowicz 2015)
-    return c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14);
-}
-void main() {
-    vec4 total = texelFetch(u_total, ivec2(gl_FragCoord.xy), 0);
-    vec3 c = max(u_exposure * total.rgb / max(total.a, 1e-6), 0.0);
-    c = clamp(u_tone == 1 ? neutral(c) : u_tone == 2 ? filmic(c) : c, 0.0, 1.0);
-    c = mix(12.92 * c, 1.055 * pow(max(c, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
-    float a = total.a / u_passes;
-    color = vec4(c * a, a);
-}`;
 
 class Renderer {
   constructor() {
@@ -78,8 +23,8 @@ class Renderer {
     gl.getExtension("EXT_color_buffer_float");
     this.age += 1;
     this.meshes = {};
-    this.add = this.link(SCREEN, ADD);
-    this.show = this.link(SCREEN, SHOW);
+    this.add = this.link(GLSL["screen.vert"], GLSL["add.frag"]);
+    this.show = this.link(GLSL["screen.vert"], GLSL["show.frag"]);
     this.nothing = gl.createVertexArray();
     this.asked = null;
     this.parallel = gl.getExtension("KHR_parallel_shader_compile");
@@ -130,7 +75,7 @@ class Renderer {
 
   // A fragment shader as `layerfit export --target essl300` prints it, for so many lights.
   material(fragment) {
-    return this.link(VERTEX, fragment.replace("\n", `\n#define LF_LIGHTS ${LIGHTS}\n`));
+    return this.link(GLSL["mesh.vert"], fragment.replace("\n", `\n#define LF_LIGHTS ${LIGHTS}\n`));
   }
 
   mesh(shape) {

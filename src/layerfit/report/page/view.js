@@ -1,12 +1,5 @@
 // A picture of a material that can be turned and lit: passes of the shader, each with other points of the lights, added up until still.
 
-// Soft boxes: their middle, the halves of their sides, and their irradiance on a surface that faces them.
-const STUDIO = [
-  { to: [-0.7, 0.45, 0.55], across: [0.22, 0, 0.28], along: [0, 0.42, -0.1], rgb: [1.1, 1.1, 1.1] },
-  { to: [0.85, 0.15, 0.2], across: [0.05, 0, -0.2], along: [0, 0.6, 0], rgb: [0.7, 0.72, 0.76] },
-  { to: [0.1, 0.98, -0.15], across: [0.5, 0, 0], along: [0, 0, 0.28], rgb: [0.8, 0.78, 0.74] },
-];
-const KEY = { size: 0.035, irradiance: 2.2 };
 const PASSES = 768;
 const COARSEST = 0.25;  // of the pixels along a side
 
@@ -83,12 +76,12 @@ class View {
     const key = [Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)];
     const [a, b] = at(0);
     const side = unit(cross([0, 1, 0], key));
-    const point = [0, 1, 2].map((i) => key[i] + KEY.size * (a * side[i] + b * cross(key, side)[i]));
-    const boxes = STUDIO.map(({ to, across, along, rgb }, n) => {
+    const point = [0, 1, 2].map((i) => key[i] + STUDIO.key.size * (a * side[i] + b * cross(key, side)[i]));
+    const boxes = STUDIO.boxes.map(({ to, across, along, rgb }, n) => {
       const [s, t] = at(n + 1);
       return [[...unit(to.map((x, i) => x + s * across[i] + t * along[i])), 0], times(rgb, this.shares.studio)];
     });
-    return [[[...point, 0], times([1, 1, 1], KEY.irradiance * this.shares.key)], ...boxes];
+    return [[[...point, 0], times([1, 1, 1], STUDIO.key.irradiance * this.shares.key)], ...boxes];
   }
 
   // Forgets what a driver that stopped has taken along.

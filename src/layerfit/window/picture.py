@@ -1,0 +1,187 @@
+"""A sphere of a material in a context of OpenGL: passes of its shader, each with other points of the lights, added up until still.
+
+The stages, the lights and the camera are those of the pages (`report/page`), so that a window and a page show the same.
+"""
+
+import json
+import math
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..capture.geometry import normalise, sphere_mesh
+from ..report import pages
+from ..shader.export import HEADERS, Shader
+
+PASSES = 768
+LIGHTS = 4
+"""In one pass: the key light, and a point of each soft box."""
+ROWS, COLUMNS = 96, 192
+HALF_FOV = math.radians(13.0)
+SLOW_S = 0.1
+"""A pass that takes longer keeps the hand waiting: it is drawn in fewer pixels."""
+COARSEST = 0.25
+"""Of the pixels along a side."""
+STUDIO = json.loads(pages.text("studio.json"))
+
+
+def toward(yaw: float, pitch: float) -> np.ndarray:
+    """Unit vector (3,) of two angles [rad]."""
+    return np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
+
+
+def lights(k: int, yaw: float, pitch: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places (4, 4) and irradiances (4, 3) of pass k: a point of the key light and of each soft box, by a sequence that fills a square
+    evenly (Roberts 2018)."""
+
+    def at(n: int) -> tuple[float, float]:
+        return 2.0 * ((0.5 + 0.7548776662 * (k + 0.37 * n)) % 1.0) - 1.0, 2.0 * (
+            (0.5 + 0.5698402910 * (k + 0.61 * n)) % 1.0
+        ) - 1.0
+
+    key = toward(yaw, pitch)
+    a, b = at(0)
+    side = normalise(np.cross([0.0, 1.0, 0.0], key))
+    places = [key + STUDIO["key"]["size"] * (a * side + b * np.cross(key, side))]
+    colours = [[STUDIO["key"]["irradiance"]] * 3]
+    for n, box in enumerate(STUDIO["boxes"], 1):
+        s, t = at(n)
+        places.append(normalise(np.add(box["to"], np.multiply(s, box["across"])) + np.multiply(t, box["along"])))
+        colours.append(box["rgb"])
+    return np.pad(np.array(places), ((0, 0), (0, 1))), np.array(colours)
+
+
+class Camera:
+    """It looks at the origin from a distance, 26 degrees across the shorter side; `shift` moves the picture by parts of a pixel."""
+
+    def __init__(
+        self, yaw: float, pitch: float, distance: float, size: tuple[int, int], shift: tuple[float, float] = (0.0, 0.0)
+    ):
+        self.distance, self.back = distance, toward(yaw, pitch)
+        self.right = normalise(np.cross([0.0, 1.0, 0.0], self.back))
+        self.up = np.cross(self.back, self.right)
+        self.eye = distance * self.back
+        near, far = distance - 2.0, distance + 2.0
+        self.scale = min(size) / math.tan(HALF_FOV) / np.array(size)
+        moved = 2.0 * np.array(shift) / size
+        z = (far + near) / (far - near)
+        self.matrix = np.array(
+            [
+                [*(self.scale[0] * self.right - moved[0] * self.back), moved[0] * distance],
+                [*(self.scale[1] * self.up - moved[1] * self.back), moved[1] * distance],
+                [*(-z * self.back), z * distance - 2.0 * far * near / (far - near)],
+                [*(-self.back), distance],
+            ]
+        )
+
+    def place(self, point: np.ndarray) -> np.ndarray:
+        """Where a point (3,) is in the picture: across and up, -1 to 1."""
+        return self.scale * np.array([self.right @ point, self.up @ point]) / (self.distance - self.back @ point)
+
+
+def replaced(old: Any, new: Any) -> Any:
+    """A framebuffer that takes the place of another, which is given back; None for the first."""
+    new.use()  # before the old one goes: moderngl would bind the released one again
+    if old is not None:
+        old.color_attachments[0].release()
+        old.release()
+    return new
+
+
+class Picture:
+    """What is seen of a material, its numbers by the names of its uniforms."""
+
+    def __init__(self, ctx: Any, shader: Shader):
+        self.ctx = ctx
+        header = HEADERS["glsl330"]
+        stage = lambda name: f"{header}\n{pages.text(name)}"  # noqa: E731
+        fragment = shader.text().replace(header, f"{header}\n#define LF_LIGHTS {LIGHTS}", 1)
+        self.material = ctx.program(vertex_shader=stage("mesh.vert"), fragment_shader=fragment)
+        self.shown = ctx.program(vertex_shader=stage("screen.vert"), fragment_shader=stage("show.frag"))
+        self.mesh, self.nothing = self._sphere(), ctx.vertex_array(self.shown, [])
+        self.values: Mapping[str, np.ndarray] = shader.uniforms
+        self.yaw, self.pitch, self.distance = 0.0, 0.17, 5.0
+        self.light = (-0.65, 0.6)
+        self.exposure, self.tone = 0.0, 0
+        self.passes, self.fineness = 0, 1.0
+        self.total: Any = None
+        self.resize((1, 1))
+        self._draw()  # some drivers compile only then, which says nothing of their pace
+
+    def _sphere(self) -> Any:
+        """The mesh of the pages, with as much of a vertex as the shader reads."""
+        normal, tangent, uv, triangles = sphere_mesh(ROWS, COLUMNS)
+        known = {"a_position": normal, "a_normal": normal, "a_tangent": tangent, "a_uv": uv}
+        buffers = [
+            (self.ctx.buffer(values.astype("f4").tobytes()), f"{values.shape[1]}f", name)
+            for name, values in known.items()
+            if name in self.material
+        ]
+        return self.ctx.vertex_array(self.material, buffers, self.ctx.buffer(triangles.astype("u4").tobytes()))
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Take a size in pixels, and begin anew."""
+        self.size = size
+        width, height = (max(1, round(side * self.fineness)) for side in size)
+        self.total = replaced(self.total, self.ctx.framebuffer([self.ctx.texture((width, height), 4, dtype="f4")]))
+        self.restart()
+
+    def change(self, **changes: Any) -> None:
+        """Set some of its attributes, and begin anew."""
+        for name, value in changes.items():
+            setattr(self, name, value)
+        self.restart()
+
+    def restart(self) -> None:
+        self.passes = 0
+
+    @property
+    def still(self) -> bool:
+        return self.passes >= PASSES
+
+    def advance(self) -> None:
+        """Draw one pass more, added to those before it; where that takes long, all anew in fewer pixels."""
+        while self._draw() > SLOW_S and self.passes <= 3 and self.fineness > COARSEST:
+            self.fineness /= 2.0
+            self.resize(self.size)
+
+    def _draw(self) -> float:
+        """A pass; returns how long it took [s]."""
+        begun, k = time.perf_counter(), self.passes
+        self.total.use()
+        if k == 0:
+            self.total.clear()
+        self.ctx.enable_only(self.ctx.CULL_FACE | self.ctx.BLEND)  # a sphere hides nothing of itself but its back
+        self.ctx.blend_func = self.ctx.ONE, self.ctx.ONE
+        self._set(k)
+        self.mesh.render()
+        self.passes += 1
+        self.ctx.finish()
+        return time.perf_counter() - begun
+
+    def _set(self, k: int) -> None:
+        """The uniforms of pass k: every pass after the first is moved by a part of a pixel."""
+        shift = ((k * 0.618034) % 1.0 - 0.5, (k * 0.754878) % 1.0 - 0.5) if k else (0.0, 0.0)
+        camera = Camera(self.yaw, self.pitch, self.distance, self.total.size, shift)
+        places, colours = lights(k, *self.light)
+        host = {"u_view_projection": camera.matrix.T, "u_eye": camera.eye, "u_up": np.array([0.0, 1.0, 0.0])}
+        host |= {"u_light": places, "u_light_rgb": colours}
+        for name, value in (host | dict(self.values)).items():
+            if (member := self.material.get(name, None)) is not None:  # its compiler drops what is not read
+                member.write(np.asarray(value, "f4").tobytes())
+
+    def present(self, target: Any) -> None:
+        """The mean of the passes as a screen shows it, onto a framebuffer of this picture's own size; nothing is drawn behind it."""
+        target.use()
+        self.ctx.enable_only(self.ctx.NOTHING)
+        self.total.color_attachments[0].use(0)
+        for name, value in {
+            "u_total": 0,
+            "u_passes": float(self.passes),
+            "u_exposure": 2.0**self.exposure,
+            "u_tone": self.tone,
+        }.items():
+            self.shown[name].value = value
+        self.nothing.render(self.ctx.TRIANGLES, vertices=3)
