@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 import types
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,9 @@ from layerfit.surfaces import Lambert
 CYCLES = {"SUN": 0.02, "RECTANGLE": 0.04, "DISK": 0.04}
 """Relative L2 between Cycles and the formula: its sphere has facets, its pixels a filter, and 64 samples are noise. Under an area both sides draw
 directions."""
+
+FILM = 0.07
+"""The same of a film."""
 
 LAMPS: list[dict[str, Any]] = [
     {"type": "directional", "to_light": [0.0, 0.6, 0.8], "irradiance_rgb": [3.0, 2.0, 1.0]},
@@ -241,6 +245,30 @@ def test_cycles_draws_the_formula_that_is_fitted(tmp_path, lamp):
     assert len(view.target) > 1000
     assert np.sqrt(np.sum((values - view.target) ** 2) / np.sum(view.target**2)) < CYCLES[lamp]
     assert values.sum() == pytest.approx(view.target.sum(), rel=0.01)
+
+
+@pytest.mark.parametrize("nm", [90.0, 300.0])
+def test_cycles_draws_the_film_that_is_fitted(tmp_path, nm):
+    """On a metal: what is left between the two are the Gaussians that stand for an eye, where Cycles has a table."""
+    python = os.environ.get("LAYERFIT_BPY")
+    if not python:
+        pytest.skip("LAYERFIT_BPY does not name a Python with bpy")
+    film = {"Thin Film Thickness": nm, "Thin Film IOR": 2.2}
+    metal = {"Base Color": [0.54, 0.5, 0.45], "Metallic": 1.0, "Roughness": 0.45, "Specular Tint": [0.95, 0.9, 0.9]}
+    made = blender.engine_of(blender.DEFAULTS | metal | film)
+    for name, text in {"make.py": STAGE + SAVE, "paint.py": _script(made), "kit.py": formats.blender_kit()}.items():
+        (tmp_path / name).write_text(text)
+    for words in (
+        ("make.py", str(tmp_path / "user.blend"), "paint.py"),
+        ("kit.py", "--blend", "user.blend", "--samples", "32"),
+    ):
+        subprocess.run([python, *words], cwd=tmp_path, check=True, capture_output=True)
+    read = blender.read(tmp_path, json.loads((tmp_path / "Sphere.principled.json").read_text()))
+    assert float(read.film_nm) == nm
+    (view,) = scene_views(tmp_path / "Sphere.toml")
+    off = lambda values: np.sqrt(np.sum((values - view.target) ** 2) / np.sum(view.target**2))  # noqa: E731
+    filmed, bare = (off(draw(view, alone(one))) for one in (read, replace(read, film_nm=None, film_eta=None)))
+    assert filmed < min(FILM, bare / 3.0)
 
 
 def _script(made: Any) -> str:

@@ -21,9 +21,12 @@ from layerfit.interchange.convert import Conversion, convert
 from layerfit.interchange.dialects import DIALECTS
 from layerfit.interchange.engine import Engine
 from layerfit.interchange.formats import identifier, read_start
+from layerfit.interchange.iridescence import filmed_metal, to_rgb
 from layerfit.interchange.mapping import copied, metal_of, stack_of
 from layerfit.layers import Coat
+from layerfit.optics.film import film_reflectance
 from layerfit.optics.fresnel import conductor_f0
+from layerfit.optics.spectra import WAVELENGTHS_NM, daylight_weights
 from layerfit.preset import read_preset
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Dielectric, Lambert
@@ -32,6 +35,8 @@ AS_PRINTED = 5e-5
 """Relative: MaterialX computes in float32 on the GPU, of inputs written with six digits."""
 FLOOR = 1e-3
 """BRDF [1/sr] below which a difference is compared absolutely."""
+EYE = 0.06
+"""Of the reflectance of a film: four Gaussians in place of an eye, where a channel is next to black."""
 SIX_DIGITS = 2e-5
 """What a document keeps of a number, in a BRDF whose lobe goes with the fourth power of a roughness."""
 
@@ -231,14 +236,40 @@ def test_next_to_nothing_is_lost_of_what_there_are_words_for(found):
 def test_a_film_is_written_where_it_is_nearer_than_none():
     """Of a temper colour: the extension of glTF, and a start of a fit from it."""
     stack = read_preset("anodised_titanium")
-    made = convert(stack, "titanium", "gltf")
-    plain = convert(stack, "titanium", "blender")
-    assert made.engine.film_nm is not None
-    assert made.error["delta_e"] < plain.error["delta_e"]
-    assert any("three channels" in sentence for sentence in made.lost)
+    made, cycles, plain = (convert(stack, "titanium", dialect) for dialect in ("gltf", "blender", "openpbr"))
+    assert plain.engine.film_nm is None
+    for filmed, on in ((made, "a clear medium"), (cycles, "a metal")):
+        assert filmed.engine.film_nm is not None
+        assert filmed.error["delta_e"] < 0.5 * plain.error["delta_e"]
+        assert any(f"three channels, on {on}" in sentence for sentence in filmed.lost)
+        base: Any = stack_of(filmed.engine).base
+        assert float(base.film_nm) == pytest.approx(float(filmed.engine.film_nm))
     assert gltf.material(made.engine, "titanium")["extensions"][gltf.IRIDESCENCE]["iridescenceFactor"] == 1.0
-    base: Any = stack_of(made.engine).base
-    assert float(base.film_nm) == pytest.approx(float(made.engine.film_nm))
+    assert float(cycles.engine.film_nm) == pytest.approx(np.mean(stack.base.film_nm), rel=0.05)
+
+
+def test_a_film_on_a_metal_is_that_of_the_spectrum():
+    """In Cycles' way it turns the phase as the metal does: the Gaussians that stand for an eye are what is left between the two."""
+    f0, f82, eta = jnp.array([0.54, 0.5, 0.45]), jnp.array([0.72, 0.67, 0.64]), jnp.asarray(2.2)
+    root = jnp.sqrt(f0)
+    n = (1.0 + root) / (1.0 - root) * (1.0 - f82) + (1.0 - f0) / (1.0 + f0) * f82
+    k = jnp.sqrt((f0 * (n + 1.0) ** 2 - (n - 1.0) ** 2) / (1.0 - f0))
+    rgb = to_rgb(jnp.float64)
+    for nm in (50.0, 90.0, 300.0):
+        for c in (0.5, 0.8, 1.0):
+            waves = [film_reflectance(jnp.asarray(c), eta, n, k, jnp.asarray(nm / wave)) for wave in WAVELENGTHS_NM]
+            wanted = np.sum(np.asarray(daylight_weights()) * np.asarray(waves), 0)
+            np.testing.assert_allclose(filmed_metal(jnp.asarray(c), nm, eta, f0, f82, rgb), wanted, atol=EYE)
+
+
+def test_a_film_of_openpbr_is_where_a_fit_starts():
+    """Written it is not: MaterialX halves what is below a film."""
+    text = openpbr.write(conversion(engine("openpbr", "metal", False)))
+    film = {"thin_film_weight": 1.0, "thin_film_thickness": 0.38, "thin_film_ior": 1.6}
+    items = "".join(f'<input name="{name}" type="float" value="{value}"/>' for name, value in film.items())
+    read = openpbr.read(Path("a.mtlx"), text.replace("</open_pbr_surface>", f"{items}</open_pbr_surface>"))
+    base: Any = stack_of(read).base
+    assert (float(base.film_nm), float(base.film_eta)) == (380.0, 1.6)
 
 
 def test_gltf_is_valid(found, tmp_path):

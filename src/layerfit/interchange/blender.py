@@ -68,6 +68,8 @@ def principled(engine: Engine) -> dict[str, Any]:
         }
         if engine.coat_tau is not None:
             found["Coat Tint"] = words.tint(engine, 2.0)
+    if engine.film_nm is not None:
+        found |= {"Thin Film Thickness": words.digits(engine.film_nm), "Thin Film IOR": words.digits(engine.film_eta)}
     return found
 
 
@@ -94,6 +96,8 @@ DEFAULTS: dict[str, Any] = {
     "Coat Roughness": 0.03,
     "Coat IOR": 1.5,
     "Coat Tint": [1.0, 1.0, 1.0],
+    "Thin Film Thickness": 0.0,
+    "Thin Film IOR": 1.33,
 }
 """Of the inputs that are read (Blender 4 and 5)."""
 
@@ -130,6 +134,8 @@ def engine_of(values: dict[str, Any]) -> Engine:
         found["metallic"] = values["Metallic"]
     if kind in ("metal", "mixed"):
         found["edge_tint"] = np.asarray(values["Specular Tint"], float)
+    if kind == "metal" and values["Thin Film Thickness"] > 0.0:
+        found |= words.film(values["Thin Film Thickness"], values["Thin Film IOR"])
     if kind == "glossy":
         found["ior"] = float(np.clip(values["IOR"], 1.0, 3.0))
     if values["Anisotropic"] > 0.0:

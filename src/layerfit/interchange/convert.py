@@ -118,10 +118,10 @@ def lost(stack: Stack, engine: Engine) -> tuple[str, ...]:
 
 def _lost_of(layer: Any, stack: Stack, engine: Engine) -> list[str]:
     film = getattr(layer, "film_nm", None) is not None
+    on = {"clear": "on a clear medium that reflects like the metal", "metal": "on a metal of two reflectances"}
     said = {
         "its film: the colour that changes with the angle": film and engine.film_nm is None,
-        "its film: interference in three channels, on a clear medium that reflects like the metal": film
-        and engine.film_nm is not None,
+        f"its film: interference in three channels, {on[engine.rules.film_on]}": film and engine.film_nm is not None,
         "what differs from place to place: its mean is taken": bool(getattr(layer, "reads", ())),
         "Beckmann's facets: GGX in their place": getattr(layer, "distribution", "ggx") != "ggx",
     }

@@ -21,15 +21,19 @@ class Dialect:
     """Way through the absorbing coat: of both directions refracted, twice that of the viewer, twice its thickness; None where it cannot absorb."""
     edge_tint: bool = False
     """Whether a metal has a reflectance of its own at 82 degrees (Hoffman 2019)."""
-    layered: bool = False
-    """Whether a base's dielectric lobe takes from its diffuse part."""
-    compensates: Literal["lobes", "base"] | None = None
+    beside: Literal["half", "normal"] = "half"
+    """What a dielectric lobe leaves to the diffuse part beside it: 1 - F of the half angle, or of normal incidence."""
+    compensates: Literal["lobes", "base", "filmed"] | None = None
     """Which lobes are scaled for light that goes to and fro between facets (Turquin 2019, eq. 16): all, by their reflectance there, or that of
-    the base alone, by its reflectance at normal incidence."""
+    the base alone, by its reflectance at normal incidence, or by that of its film."""
     metal_dims: bool = False
     """Whether the metal in a mixed base takes from its diffuse part what it reflects at grazing angles."""
     film: Literal["view", "half"] | None = None
     """Of which angle the reflectance of a film on a metal is: that of the view or the half angle; None where films are not written."""
+    film_on: Literal["clear", "metal"] = "clear"
+    """What lies below the film: a clear medium that reflects as the metal does, or one that absorbs."""
+    film_coated: bool = True
+    """Whether a film below a coat is as it is in air."""
     gaussian: bool = False
     """Whether the power of Schlick's formula is a spherical Gaussian (Lagarde 2012)."""
     masks_evenly: bool = False
@@ -52,7 +56,6 @@ DIALECTS = {
         passes="albedo",
         path="flat",
         edge_tint=True,
-        layered=True,
         compensates="lobes",
         masks_evenly=True,
         widens=2.0,
@@ -62,7 +65,6 @@ DIALECTS = {
     "gltf": Dialect(
         "glTF 2.0 with KHR_materials_clearcoat and KHR_materials_iridescence",
         film="half",
-        layered=True,
     ),
     # Cycles 5.0, kernel/svm/closure.h, with the distribution GGX: the light that leaves is taken to go as the viewer looks.
     "blender": Dialect(
@@ -71,17 +73,18 @@ DIALECTS = {
         coat_index=True,
         path="view",
         edge_tint=True,
-        layered=True,
+        film="half",
+        film_on="metal",
     ),
     # three.js, lights_physical_pars_fragment.glsl of release 187. Earlier ones compensated nothing, and did not dim the diffuse part.
-    "three": Dialect(
-        "three.js r187, MeshPhysicalMaterial", layered=True, compensates="base", metal_dims=True, gaussian=True, film="view"
-    ),
+    "three": Dialect("three.js r187, MeshPhysicalMaterial", compensates="base", metal_dims=True, gaussian=True, film="view"),
     # Babylon.js, pbrClearCoatFunctions and pbrDirectLightingFunctions of release 9.34.
     "babylon": Dialect(
         "Babylon.js 9, PBRMaterial with a clear coat",
-        layered=True,
-        compensates="base",
+        beside="normal",
+        film="view",
+        film_coated=False,
+        compensates="filmed",
         coat_index=True,
         coat_masking="kelemen",
         passes="half",

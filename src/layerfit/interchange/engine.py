@@ -12,7 +12,7 @@ from ..optics.fresnel import dielectric_f0, fresnel_dielectric, fresnel_schlick
 from ..optics.microfacet import density, half_cosine, half_vector, visibility
 from ..surfaces.base import Surface
 from .dialects import COAT_INDEX, DIALECTS, Dialect
-from .iridescence import filmed_reflectance, to_rgb
+from .iridescence import filmed_metal, filmed_reflectance, to_rgb
 
 GRAZING = 1.0 / 7.0
 """Cosine of 82 degrees, where the edge tint of a metal is given (Hoffman 2019)."""
@@ -109,8 +109,10 @@ class Engine(Surface):
             if self.rules.metal_dims:
                 diffuse = diffuse * (1.0 - self.metallic * self._schlick(c, 0.0))
             return lobe * self.metallic + diffuse * (1.0 - self.metallic)
-        kept = self._beside(wo, self._mean_width, dielectric_f0(self.ior), boost) if self.rules.exact else 1.0 - F
-        return lobe + self.base_color / jnp.pi * (kept if self.rules.layered else 1.0)
+        f0 = dielectric_f0(self.ior)
+        lost = F if self.rules.beside == "half" else f0
+        kept = self._beside(wo, self._mean_width, f0, boost) if self.rules.exact else 1.0 - lost
+        return lobe + self.base_color / jnp.pi * kept
 
     def _beside(self, wo: Vec3, alpha: Any, f0: Any, boost: Any = 1.0) -> Any:
         """Part of the light that a dielectric lobe leaves to the diffuse part; MaterialX counts a lobe of no reflectance at the normal, too."""
@@ -153,6 +155,10 @@ class Engine(Surface):
             return self._metal_reflectance(c)
         at = wo[2] if self.rules.film == "view" else c
         rgb = (self.film_x, self.film_y, self.film_z)
+        if self.rules.film_on == "metal":
+            return filmed_metal(
+                at, self.film_nm, self.film_eta, self.base_color, self._metal_reflectance(jnp.asarray(GRAZING)), rgb
+            )
         return filmed_reflectance(at, self.film_nm, self.film_eta, self.base_color, rgb, self._schlick)
 
     def _schlick(self, c: Scalar, f0: Any) -> Any:
@@ -197,9 +203,13 @@ class Engine(Surface):
 
     def _base_compensation(self, NoV: Scalar, F: Any) -> Any:
         """What the lobe of the base, of the reflectance F, is scaled by."""
-        if self.rules.compensates != "base":
-            return self._compensation(NoV, self._mean_width, F) if self.rules.compensates else 1.0
+        if self.rules.compensates is None:
+            return 1.0
+        if self.rules.compensates == "lobes":
+            return self._compensation(NoV, self._mean_width, F)
         f0 = dielectric_f0(self.ior) if self.base == "glossy" else self.base_color
+        if self.film_nm is not None and self.rules.compensates == "filmed":
+            f0 = F
         across = self.alpha if self.alpha_x is None else jnp.minimum(self.alpha_x, self.alpha_y)
         return self._compensation(NoV, across, f0 * self.metallic if self.base == "mixed" else f0)
 

@@ -128,8 +128,7 @@ def engine_of(made: Any, where: str) -> Engine:
     if kind == "mixed":
         found["metallic"] = metallic
     if kind == "metal" and number(film, "iridescenceFactor", 0.0) > 0.0:
-        found["film_nm"] = float(np.clip(number(film, "iridescenceThicknessMaximum", 400.0), 0.0, 2000.0))
-        found["film_eta"] = float(np.clip(number(film, "iridescenceIor", 1.3), 1.0, 3.0))
+        found |= words.film(number(film, "iridescenceThicknessMaximum", 400.0), number(film, "iridescenceIor", 1.3))
     if kind == "glossy":
         found["ior"] = float(np.clip(number(ior, "ior", 1.5), 1.0, 3.0))
     if strength := number(grain, "anisotropyStrength", 0.0):

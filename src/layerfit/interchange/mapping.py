@@ -50,6 +50,8 @@ def filmed(stack: Stack, engine: Engine) -> Engine | None:
     base = stack.base
     if engine.rules.film is None or engine.base != "metal" or not isinstance(base, Conductor) or base.film_nm is None:
         return None
+    if engine.coat_alpha is not None and not engine.rules.film_coated:
+        return None
     bare = copied(replace(stack, base=replace(base, film_nm=None, film_eta=None)), engine.dialect)
     return replace(bare, film_nm=_number(base.film_nm), film_eta=_number(base.film_eta))
 

@@ -81,6 +81,9 @@ DEFAULTS: dict[str, Any] = {
     "coat_color": [1.0, 1.0, 1.0],
     "coat_roughness": 0.0,
     "coat_ior": 1.6,
+    "thin_film_weight": 0.0,
+    "thin_film_thickness": 0.5,
+    "thin_film_ior": 1.4,
 }
 """Of the inputs that are read (OpenPBR 1.1)."""
 
@@ -133,6 +136,8 @@ def engine_of(values: dict[str, Any]) -> Engine:
         found["metallic"] = values["base_metalness"]
     if kind in ("metal", "mixed"):
         found["edge_tint"] = np.asarray(values["specular_color"], float)
+    if kind == "metal" and values["thin_film_weight"] > 0.0:
+        found |= words.film(1000.0 * values["thin_film_thickness"], values["thin_film_ior"])  # from micrometres
     if kind == "glossy" and not coated:
         found["ior"] = values["specular_ior"]
     if ratio := min(max(values["specular_roughness_anisotropy"], 0.0), 0.999):

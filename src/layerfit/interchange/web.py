@@ -101,7 +101,11 @@ def babylon_settings(engine: Engine) -> dict[str, str]:
         settings["indexOfRefraction"] = f"{words.digits(engine.ior):g}"
     elif engine.base != "metal":
         settings["metallicF0Factor"] = "0"  # else a dielectric has a lobe of its own
-    return settings | _babylon_grain(engine, pair) | _babylon_coat(engine)
+    if engine.base == "mixed":
+        settings["brdf.useLegacySpecularEnergyConservation"] = (
+            "false"  # else that factor takes a metal's reflectance at grazing angles, too
+        )
+    return settings | _babylon_grain(engine, pair) | _babylon_film(engine) | _babylon_coat(engine)
 
 
 def _babylon_grain(engine: Engine, pair: tuple[float, float] | None) -> dict[str, str]:
@@ -111,6 +115,14 @@ def _babylon_grain(engine: Engine, pair: tuple[float, float] | None) -> dict[str
     direction = "new Vector2(0, 1)" if words.across(engine) else "new Vector2(1, 0)"
     grain = {"isEnabled": "true", "intensity": f"{words.strength(pair):g}", "direction": direction}
     return {f"anisotropy.{key}": value for key, value in grain.items()}
+
+
+def _babylon_film(engine: Engine) -> dict[str, str]:
+    if engine.film_nm is None:
+        return {}
+    film = {"isEnabled": "true", "intensity": "1"}
+    film |= {"indexOfRefraction": f"{words.digits(engine.film_eta):g}", "maximumThickness": f"{words.digits(engine.film_nm):g}"}
+    return {f"iridescence.{key}": value for key, value in film.items()}
 
 
 def _babylon_coat(engine: Engine) -> dict[str, str]:

@@ -53,6 +53,11 @@ def depth(tint: Any, ways: float) -> np.ndarray:
     return -np.log(np.clip(np.asarray(tint, float), 1e-6, 1.0)) / ways
 
 
+def film(nm: float, eta: float) -> dict[str, float]:
+    """A film on a metal, as thick and as dense as an engine takes it."""
+    return {"film_nm": float(np.clip(nm, 0.0, 2000.0)), "film_eta": float(np.clip(eta, 1.0, 3.0))}
+
+
 def metallic(engine: Engine) -> float:
     """Part of the base that is metal."""
     return digits(engine.metallic) if engine.base == "mixed" else float(engine.base == "metal")

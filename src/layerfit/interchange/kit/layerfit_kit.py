@@ -16,7 +16,16 @@ from pathlib import Path
 import bpy  # pyright: ignore[reportMissingImports]
 
 COLOURS = ("Base Color", "Specular Tint", "Coat Tint")
-NUMBERS = ("Metallic", "Roughness", "IOR", "Specular IOR Level", "Anisotropic", "Anisotropic Rotation")
+NUMBERS = (
+    "Metallic",
+    "Roughness",
+    "IOR",
+    "Specular IOR Level",
+    "Anisotropic",
+    "Anisotropic Rotation",
+    "Thin Film Thickness",
+    "Thin Film IOR",
+)
 COAT = ("Coat Weight", "Coat Roughness", "Coat IOR")
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD", "VOLUME"}
 POINT = 1e-3
