@@ -154,7 +154,6 @@ def check(paths: list[Path], model: str) -> None:
 
 
 CONSTANTS = {
-    "P": (curves, one_coat, two_coats, bounces),
     "WIDTH": (curves,),
     "STEER": (curves,),
     "AGAIN": (bounces,),
@@ -169,12 +168,10 @@ CONSTANTS = {
 def fit(paths: list[Path]) -> None:
     """Levenberg-Marquardt on a smooth form of the error, constants scaled by their present values."""
     start = {name: getattr(modules[0], name) for name, modules in CONSTANTS.items()}
-    start |= {f"DIRECT{k}": v for k, v in enumerate(one_coat.DIRECT)} | {
-        f"DIRECT_PATH{k}": v for k, v in enumerate(one_coat.DIRECT_PATH)
-    }
+    start |= {f"DIRECT{k}": v for k, v in enumerate(one_coat.DIRECT)}
     names, origin = list(start), np.array(list(start.values()))
     _loosen()
-    sets = [(i, rows(paths, i, "conductor")) for i in ("single", "multi")]
+    sets = [(i, {key: jnp.asarray(x) for key, x in rows(paths, i, "conductor").items()}) for i in ("single", "multi")]
 
     def residual(x: Any) -> Any:
         _set(dict(zip(names, x * jnp.asarray(origin, jnp.float32), strict=True)))
@@ -194,7 +191,7 @@ def fit(paths: list[Path]) -> None:
         np.ones(len(names)),
         jac=lambda x: np.asarray(jacobian(jnp.asarray(x, jnp.float32)), float),
         loss="soft_l1",
-        f_scale=0.05,
+        f_scale=0.2,
         bounds=(0.3, 3.0),
         max_nfev=60,
     )
@@ -204,20 +201,18 @@ def fit(paths: list[Path]) -> None:
 
 
 def _loosen() -> None:
-    """Let constants be traced: functions without their caches, powers with any exponent."""
+    """Let constants be traced: functions without their caches."""
     for module in (one_coat, two_coats, bounces, curves):
         for name, value in vars(module).items():
             if hasattr(value, "__wrapped__") and hasattr(value, "lower"):
                 setattr(module, name, value.__wrapped__)
-        module.safe_power = lambda x, exponent: jnp.power(jnp.maximum(x, 1e-30), exponent)
 
 
 def _set(values: dict[str, Any]) -> None:
     for name, modules in CONSTANTS.items():
         for module in modules:
             setattr(module, name, values[name])
-    for name in ("DIRECT", "DIRECT_PATH"):
-        setattr(one_coat, name, tuple(values[f"{name}{k}"] for k in range(3)))
+    one_coat.DIRECT = tuple(values[f"DIRECT{k}"] for k in range(2))
 
 
 def main() -> None:

@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Conductor {
@@ -42,8 +42,6 @@ struct Curve {
     vec3 c3;  // 
     vec3 c4;  // 
     vec3 c5;  // 
-    vec3 c6;  // 
-    vec3 c7;  // 
 };
 
 struct Crossing {
@@ -55,6 +53,12 @@ struct Crossing {
     float s;      // argument of the baked curves
 };
 
+struct Shares {
+    float base;  // due to the base
+    float i;     // due to one crossing
+    float o;     // due to the other
+};
+
 const Coat lf_shellac = Coat(
     0.05,                   // alpha: width of the facet slopes; the square of an artist's roughness
     1.52,                   // eta: index of refraction, against air
@@ -62,18 +66,18 @@ const Coat lf_shellac = Coat(
 );
 
 const Interface lf_shellac_interface = Interface(
-    0.010720346,                                                   // tilt: turn of the mean facet towards a grazing direction
-    0.009790741,                                                   // gain: part of the reflected light that a second facet lets in
-    vec4(-0.010497774, 0.023259478, -0.025306048, 0.028166955),    // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.011702711, -0.027349332, 0.027280606, -0.0044057593),  // passed_high: the other four, of higher powers
-    vec4(1.0082508, -0.018169343, 0.016718268, -0.00944829),       // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.036545753, -0.04791069, -0.0050463676, 0.020480156),    // bend_high: 
-    vec4(0.6282463, -0.30009377, -0.014748305, 0.030863881),       // spread: width of a lobe seen through it
-    vec4(0.6599215, -0.8535671, -0.21940088, 0.4492488),           // spread_high: 
-    vec4(1.0153366, -0.03897676, 0.03558123, -0.035981655),        // path: mean path over that of the refracted direction
-    vec4(0.12775707, -0.12147713, -0.060610294, 0.07959652),       // path_high: 
-    vec4(0.029641764, -0.09094909, 0.11677008, 0.01921773),        // theta: scale of the path's distribution
-    vec4(0.17687947, -0.55896205, -0.033911437, 0.3727157)         // theta_high: 
+    0.010720346,                                      // tilt: turn of the mean facet towards a grazing direction
+    0.009790741,                                      // gain: part of the reflected light that a second facet lets in
+    vec3(-0.024019195, 0.037430365, -0.012146365),    // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(-0.008774286, 0.01589695, -0.00900097),      // passed_high: the other three, of higher powers
+    vec3(0.01888021, -0.03414776, 0.028381942),       // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.020505816, 0.009172212, -0.00040528714),  // bend_high: 
+    vec3(0.7622598, -0.35900348, 0.3005035),          // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.38898873, 0.0026233941, 0.06684631),      // spread_high: 
+    vec3(1.0406599, -0.08520222, 0.085663974),        // path: mean path over that of the refracted direction
+    vec3(-0.055683732, -0.002040565, 0.01779306),     // path_high: 
+    vec3(0.09075124, -0.2020707, 0.24339886),         // theta: scale of the path's distribution
+    vec3(-0.256472, 0.061698347, 0.08315918)          // theta_high: 
 );
 
 const Conductor lf_gold = Conductor(
@@ -83,43 +87,26 @@ const Conductor lf_gold = Conductor(
 );
 
 const Curve lf_shellac_again = Curve(
-    vec3(0.13500996, 0.10659347, 0.05270086),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.016771981, -0.012792306, -0.005902755),     // c1: 
-    vec3(-0.035883844, -0.027347945, -0.012373393),     // c2: 
-    vec3(-0.035732254, -0.025867984, -0.010901697),     // c3: 
-    vec3(0.016767338, 0.013031423, 0.004698217),        // c4: 
-    vec3(0.013572037, 0.004616499, -0.0018166602),      // c5: 
-    vec3(-0.0069274902, -0.0055187494, -0.0014832541),  // c6: 
-    vec3(-0.007839888, -0.002088219, 0.001863569)       // c7: 
+    vec3(0.13857856, 0.10929926, 0.053955764),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.009116745, -0.0070479074, -0.0031201364),  // c1: 
+    vec3(0.01774586, 0.014638117, 0.0070619714),       // c2: 
+    vec3(0.012346193, 0.009120956, 0.0037746653),      // c3: 
+    vec3(-0.045131255, -0.0354554, -0.016701838),      // c4: 
+    vec3(-0.04931666, -0.037695386, -0.017225698)      // c5: 
 );
 
 const Curve lf_shellac_rest = Curve(
-    vec3(0.9083795, 0.60383517, 0.2814989),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.13272768, -0.08947236, -0.04318124),   // c1: 
-    vec3(-0.1950913, -0.1445114, -0.08247939),     // c2: 
-    vec3(-0.20047903, -0.15425944, -0.096981466),  // c3: 
-    vec3(0.15642321, 0.14234006, 0.09529245),      // c4: 
-    vec3(0.26577806, 0.23432732, 0.17387569),      // c5: 
-    vec3(-0.09419155, -0.09081054, -0.063167214),  // c6: 
-    vec3(-0.17685461, -0.15596747, -0.11619109)    // c7: 
+    vec3(0.94015753, 0.625161, 0.29161036),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.07055695, -0.04746662, -0.022553798),  // c1: 
+    vec3(0.03235796, 0.021158427, 0.00868921),     // c2: 
+    vec3(0.035348237, 0.023400962, 0.014860764),   // c3: 
+    vec3(-0.18866628, -0.12874925, -0.064854026),  // c4: 
+    vec3(-0.20295101, -0.13614896, -0.07137421)    // c5: 
 );
 
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    float s = x / (2.0 + x);
-    float u = s * s;
-    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-    float far = log(1.0 + x);
-    return abs(x) > 0.3 ? far : near;
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
-
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -142,10 +129,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -154,14 +140,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
@@ -209,27 +192,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Part of a lobe's width, as a power, that is due to the base.
-float lf_base_share(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412);
-    return base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
+// What the width of a lobe is due to.
+Shares lf_split(Crossing i, Crossing o, float alpha) {
+    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
+    float first = pow(max(i.a, 1e-30), 1.41);
+    float second = pow(max(o.a, 1e-30), 1.41);
+    float inverse = 1.0 / (base + first + second);
+    return Shares(base * inverse, first * inverse, second * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec4 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
-    float own = pow(max(x.a, 1e-30), 1.412);
-    float total = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float turn = 0.7504 * own / total;
-    vec3 y = x.w.xyz - turn * (i.w.xyz + o.w.xyz);
-    float sine = sqrt(dot(y, y));
-    float held = min(1.0, 0.9998 / max(sine, 1e-06));
-    sine = min(sine, 0.9998);
-    return vec4(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
-}
-
-// Part of the path's spread that counts, by the base's share of the width.
-float lf_direct(float share, float d, float c, float e) {
-    return min(max(d + c * pow(max(share, 1e-30), e), 0.0), 1.5);
+vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
+    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    float z2 = x.w.w * x.w.w;
+    z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
+    return vec4(x.w.xyz - turn, sqrt(z2));
 }
 
 // Mean path of light that the base sends on: between that of one direction and that of all that cross.
@@ -238,22 +215,9 @@ float lf_between(vec4 y, Crossing x, float part) {
     return straight + part * (x.path - straight);
 }
 
-// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
-vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    float scale = max(theta, 1e-06);
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
-}
-
-// Mean of u among the paths that are left: sum of u exp(-tau u) over that of exp(-tau u).
-vec3 lf_projected(float path, float theta, vec3 tau) {
-    return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
+// How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
+vec3 lf_spread_root(float theta, vec3 tau) {
+    return sqrt(1.0 + 2.0 * theta * tau);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -268,61 +232,47 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 twice_ac = 2.0 * a * c;
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
-// 0 where the indices match and there is no interface, 1 from the first index of the tables on.
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
 float lf_presence(float eta) {
     return 2.0 - 1.0;
 }
 
-// Lambda of the GGX distribution (Heitz 2014, eq. 72).
-float lf_smith_lambda(vec4 w, float alpha) {
-    float tan2 = dot(w.xyz, w.xyz) / (w.w * w.w);
-    float x = alpha * alpha * tan2;
-    return 0.5 * x / (1.0 + sqrt(1.0 + x));
-}
-
-// D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
-float lf_lobe(Crossing i, Crossing o, vec4 yi, vec4 yo, float alpha, float masked) {
-    float M = yi.w + yo.w;
-    float M2 = M * M;
-    float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float width2 = pow(pow(alpha * M, 1.412) + spread, 1.4164306);
-    float own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float r = 1.0 + 0.3271 * (width2 / own2 - 1.0);
-    r = min(r, 4.0);
-    float log_r = log(r);
-    float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
-    vec3 t = i.w.xyz + o.w.xyz;
-    float v = dot(t, t) / width2;
-    vec3 Y = yi.xyz + yo.xyz;
-    float tilt = 1.0 + dot(Y, Y) / M2;
-    float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
-    return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * width2 * (1.0 + v * (b + r * v)));
-}
-
 // The polynomial at s; an energy is never below 0.
 vec3 lf_amount(Curve curve, float s) {
-    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper)));
+    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
+}
+
+// Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
+float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
+    float base = alpha * M;
+    float width2 = pow(max(pow(max(base, 1e-30), 1.41) + (pow(max(i.a, 1e-30), 1.41) + pow(max(o.a, 1e-30), 1.41)), 1e-30), 1.4184397);
+    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
+    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
 
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 float lf_wider(float alpha, float coat_alpha) {
-    return pow(2.0 * pow(alpha, 1.412) + 0.5751 * pow(coat_alpha, 1.412), 0.7082153);
-}
-
-// The polynomial at s; an energy is never below 0.
-vec3 lf_amount2(Curve curve, float s) {
-    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
     float back = eta * eta * dot(i.w.xyz, o.w.xyz);
     return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+}
+
+// Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
+float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
+    float M = yi.w + yo.w;
+    float slope = h2 / M;
+    float projection_i = lf_ggx_projection(yi, width);
+    float projection_o = lf_ggx_projection(yo, width);
+    return slope * slope * (yi.w * yo.w) * lf_v_smith(yi.w, yo.w, projection_i, projection_o);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -336,27 +286,25 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_shellac.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_shellac.eta * lf_shellac.eta);
-    float share = lf_base_share(crossing, crossing2, lf_gold.alpha);
-    vec4 yi = lf_lean(crossing, crossing, crossing2, lf_gold.alpha);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, lf_gold.alpha);
-    float part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_shellac.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    float path = lf_between(yi, crossing, part);
-    vec3 U = lf_projected(path, part * crossing.theta, lf_shellac.tau);
-    part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    A = A * lf_absorbed(lf_between(yo, crossing2, part), part * crossing2.theta, lf_shellac.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    path = lf_between(yo, crossing2, part);
-    U = U * lf_projected(path, part * crossing2.theta, lf_shellac.tau);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_gold.eta, lf_gold.k);
-    float rise = 1.0 + 0.3036 * lf_presence(lf_shellac.eta) * lf_shellac.alpha * lf_shellac.alpha * share;
-    float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, lf_gold.alpha, lf_gold.alpha);
+    Shares shares = lf_split(crossing, crossing2, lf_gold.alpha);
+    float part = 0.2675 + 0.5116 * shares.base * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float path_i = lf_between(yi, crossing, part);
+    float path_o = lf_between(yo, crossing2, part);
+    vec3 root_i = lf_spread_root(part * crossing.theta, lf_shellac.tau);
+    vec3 root_o = lf_spread_root(part * crossing2.theta, lf_shellac.tau);
+    vec3 U = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
+    vec3 throughput2 = throughput * exp(-(lf_shellac.tau + (path_i - 1.0) * (2.0 * lf_shellac.tau / (1.0 + root_i)) + (lf_shellac.tau + (path_o - 1.0) * (2.0 * lf_shellac.tau / (1.0 + root_o)))));
+    vec4 h = yi + yo;
+    float h2 = dot(h, h);
+    vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_gold.eta, lf_gold.k);
+    float rise = 1.0 + 0.468 * lf_presence(lf_shellac.eta) * lf_shellac.alpha * lf_shellac.alpha * shares.base;
     vec3 again = 0.5 * F2 * (lf_amount(lf_shellac_again, crossing.s) + lf_amount(lf_shellac_again, crossing2.s));
-    vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(lf_gold.alpha, lf_shellac.alpha), lf_gold.alpha);
-    vec3 root = lf_amount2(lf_shellac_rest, crossing.s) * lf_amount2(lf_shellac_rest, crossing2.s);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_gold.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_gold.alpha, lf_shellac.alpha));
+    vec3 root = lf_amount(lf_shellac_rest, crossing.s) * lf_amount(lf_shellac_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_shellac.eta, lf_gold.alpha);
-    vec3 value = F * D * V + throughput * A * (F2 * U * lobes2 + rest);
+    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_gold.alpha) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

@@ -18,16 +18,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Conductor {
@@ -44,8 +44,6 @@ struct Curve {
     vec3 c3;  // 
     vec3 c4;  // 
     vec3 c5;  // 
-    vec3 c6;  // 
-    vec3 c7;  // 
 };
 
 struct Crossing {
@@ -57,6 +55,12 @@ struct Crossing {
     float s;      // argument of the baked curves
 };
 
+struct Shares {
+    vec2 base;  // due to the base
+    vec2 i;     // due to one crossing
+    vec2 o;     // due to the other
+};
+
 const Coat lf_oxide = Coat(
     0.12,                             // alpha_x: width of the facet slopes along the tangent; the square of an artist's roughness
     0.3,                              // alpha_y: width of the facet slopes across the tangent; the square of an artist's roughness
@@ -65,18 +69,18 @@ const Coat lf_oxide = Coat(
 );
 
 const Interface lf_oxide_interface = Interface(
-    0.030373108,                                                   // tilt: turn of the mean facet towards a grazing direction
-    0.051016223,                                                   // gain: part of the reflected light that a second facet lets in
-    vec4(-0.026438614, 0.031092362, 0.0037598205, -0.024387386),   // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(0.016983526, -0.0009931438, -0.010510363, 0.0061874427),  // passed_high: the other four, of higher powers
-    vec4(1.049147, -0.09010798, 0.09616101, -0.07826352),          // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.023943663, 0.0382061, -0.033251762, 0.003540516),       // bend_high: 
-    vec4(0.6830021, -0.32650608, 0.23184666, -0.3111801),          // spread: width of a lobe seen through it
-    vec4(0.002347231, 0.3166604, -0.07940602, -0.08385873),        // spread_high: 
-    vec4(1.0580403, -0.12662041, 0.15291381, -0.12911868),         // path: mean path over that of the refracted direction
-    vec4(-0.01704669, 0.12780285, -0.028595924, -0.032527447),     // path_high: 
-    vec4(0.14166643, -0.32505417, 0.43132013, -0.22592713),        // theta: scale of the path's distribution
-    vec4(-0.1666644, 0.06288177, 0.03393604, 0.10185954)           // theta_high: 
+    0.030373108,                                      // tilt: turn of the mean facet towards a grazing direction
+    0.051016223,                                      // gain: part of the reflected light that a second facet lets in
+    vec3(-0.03604947, 0.010694278, 0.02764687),       // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.0047039147, -0.007703439, -0.0034511923),  // passed_high: the other three, of higher powers
+    vec3(0.10008009, -0.14083755, 0.047642227),       // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(0.011817302, -0.011681536, 0.0024273526),    // bend_high: 
+    vec3(0.8590729, -0.43609256, 0.091488555),        // spread: width of a lobe seen through it, over that of the facets
+    vec3(0.071232915, -0.10349935, -0.044332564),     // spread_high: 
+    vec3(1.1351962, -0.21217495, 0.067353785),        // path: mean path over that of the refracted direction
+    vec3(0.038277626, -0.021671832, -0.002115488),    // path_high: 
+    vec3(0.41057786, -0.7462359, 0.3733016),          // theta: scale of the path's distribution
+    vec3(0.0021906942, -0.08426255, 0.08728502)       // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -87,54 +91,37 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.011929514, 0.011332409, 0.010220429),           // c0: coefficients of the powers of the curves' argument
-    vec3(0.00090171956, 0.00087556755, 0.0008256226),      // c1: 
-    vec3(-0.00021067727, -0.00018693507, -0.00014501996),  // c2: 
-    vec3(0.0014103465, 0.0013502911, 0.0012379624),        // c3: 
-    vec3(-0.0014883056, -0.0014120378, -0.001270175),      // c4: 
-    vec3(-0.0033544824, -0.0031982213, -0.0029075593),     // c5: 
-    vec3(0.00069625676, 0.0006603338, 0.0005936064),       // c6: 
-    vec3(0.0016159266, 0.0015408173, 0.0014010966)         // c7: 
+    vec3(0.011797163, 0.011201477, 0.010092123),         // c0: coefficients of the powers of the curves' argument
+    vec3(0.0011525475, 0.0011055458, 0.0010179856),      // c1: 
+    vec3(0.00063456735, 0.00060508447, 0.0005502179),    // c2: 
+    vec3(0.0016498081, 0.0015635174, 0.0014035571),      // c3: 
+    vec3(-0.00080424454, -0.0007445696, -0.0006361869),  // c4: 
+    vec3(-0.0017090943, -0.0016042795, -0.0014119484)    // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.22969471, 0.22803953, 0.22248548),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.008985117, -0.008829072, -0.008387335),     // c1: 
-    vec3(-0.0020988733, -0.0018028617, -0.0012210459),  // c2: 
-    vec3(0.020863712, 0.020923734, 0.0208475),          // c3: 
-    vec3(-0.03589475, -0.035924852, -0.03562635),       // c4: 
-    vec3(-0.06489444, -0.06491935, -0.0643394),         // c5: 
-    vec3(0.018824518, 0.018769741, 0.018469572),        // c6: 
-    vec3(0.03725159, 0.03722608, 0.036804795)           // c7: 
+    vec3(0.23026316, 0.22859032, 0.22297509),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.003695365, -0.003735289, -0.0037353113),  // c1: 
+    vec3(0.007266909, 0.0073630065, 0.007492587),     // c2: 
+    vec3(0.024630308, 0.024802774, 0.024928242),      // c3: 
+    vec3(-0.026313663, -0.026173554, -0.025652163),   // c4: 
+    vec3(-0.036676407, -0.03663984, -0.036236435)     // c5: 
 );
 
 const Interface lf_oxide_across = Interface(
-    0.07474731,                                                    // tilt: turn of the mean facet towards a grazing direction
-    0.19855128,                                                    // gain: part of the reflected light that a second facet lets in
-    vec4(-0.06998208, 0.039814007, 0.019670468, 0.031079702),      // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.04926113, -0.009087533, 0.022914242, -0.0047314987),   // passed_high: the other four, of higher powers
-    vec4(1.201497, -0.22731861, 0.065406084, 0.0688498),           // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.052571774, -0.012022972, 0.016194582, -0.0008916855),  // bend_high: 
-    vec4(0.5788233, -0.1210029, -0.085519314, 0.06516874),         // spread: width of a lobe seen through it
-    vec4(0.017359018, -0.044457674, 0.00016617775, 0.01154232),    // spread_high: 
-    vec4(1.1546519, -0.2426545, 0.11052668, 0.05940342),           // path: mean path over that of the refracted direction
-    vec4(-0.09913707, 0.02535057, 0.031274796, -0.019453526),      // path_high: 
-    vec4(0.37487894, -0.6125325, 0.34147, 0.13679889),             // theta: scale of the path's distribution
-    vec4(-0.31198293, 0.086444974, 0.11123583, -0.048911422)       // theta_high: 
+    0.07474731,                                     // tilt: turn of the mean facet towards a grazing direction
+    0.19855128,                                     // gain: part of the reflected light that a second facet lets in
+    vec3(-0.0848371, 0.031376388, -0.008033876),    // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.03345237, 0.01668107, -0.007443741),     // passed_high: the other three, of higher powers
+    vec3(0.2908306, -0.17414103, -0.08314511),      // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.010737725, 0.022834145, 0.013541639),   // bend_high: 
+    vec3(0.6156385, -0.029582255, -0.07202415),     // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.04607129, -0.026856184, -0.013792217),  // spread_high: 
+    vec3(1.272488, -0.24106285, -0.07674903),       // path: mean path over that of the refracted direction
+    vec3(0.038464427, 0.026356637, 0.0006881952),   // path_high: 
+    vec3(0.9425542, -1.0819294, -0.15661979),       // theta: scale of the path's distribution
+    vec3(0.31639296, 0.092320696, -0.033271924)     // theta_high: 
 );
-
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    float s = x / (2.0 + x);
-    float u = s * s;
-    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-    float far = log(1.0 + x);
-    return abs(x) > 0.3 ? far : near;
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
 
 // How much of a rough top's effect on light is by slopes along the tangent: half of it at the normal, all along the tangent.
 float lf_share_along(vec3 w) {
@@ -146,22 +133,22 @@ Interface lf_mixed(Interface tangent, Interface across, float share) {
     float rest = 1.0 - share;
     float tilt = share * tangent.tilt + rest * across.tilt;
     float gain = share * tangent.gain + rest * across.gain;
-    vec4 passed = share * tangent.passed + rest * across.passed;
-    vec4 passed_high = share * tangent.passed_high + rest * across.passed_high;
-    vec4 bend = share * tangent.bend + rest * across.bend;
-    vec4 bend_high = share * tangent.bend_high + rest * across.bend_high;
-    vec4 spread = share * tangent.spread + rest * across.spread;
-    vec4 spread_high = share * tangent.spread_high + rest * across.spread_high;
-    vec4 path = share * tangent.path + rest * across.path;
-    vec4 path_high = share * tangent.path_high + rest * across.path_high;
-    vec4 theta = share * tangent.theta + rest * across.theta;
-    vec4 theta_high = share * tangent.theta_high + rest * across.theta_high;
+    vec3 passed = share * tangent.passed + rest * across.passed;
+    vec3 passed_high = share * tangent.passed_high + rest * across.passed_high;
+    vec3 bend = share * tangent.bend + rest * across.bend;
+    vec3 bend_high = share * tangent.bend_high + rest * across.bend_high;
+    vec3 spread = share * tangent.spread + rest * across.spread;
+    vec3 spread_high = share * tangent.spread_high + rest * across.spread_high;
+    vec3 path = share * tangent.path + rest * across.path;
+    vec3 path_high = share * tangent.path_high + rest * across.path_high;
+    vec3 theta = share * tangent.theta + rest * across.theta;
+    vec3 theta_high = share * tangent.theta_high + rest * across.theta_high;
     return Interface(tilt, gain, passed, passed_high, bend, bend_high, spread, spread_high, path, path_high, theta, theta_high);
 }
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -184,10 +171,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -196,14 +182,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, vec2 alpha, vec3 w) 
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xy, w.xy));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = min((1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta, 1.0);
+    float z = sqrt(w.z * w.z + (1.0 - bend) * (1.0 + bend) * dot(w.xy, w.xy));
     vec2 a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec3(w.xy * bend, z), T, a, path, theta, s);
 }
 
@@ -254,28 +237,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Part of a lobe's width, as a power, that is due to the base.
-float lf_base_share(Crossing i, Crossing o, vec2 alpha) {
-    vec2 base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.412));
-    vec2 t = base / (base + pow(max(i.a, 1e-30), vec2(1.412)) + pow(max(o.a, 1e-30), vec2(1.412)));
-    return 0.5 * (t.x + t.y);
+// What the width of a lobe is due to.
+Shares lf_split(Crossing i, Crossing o, vec2 alpha) {
+    vec2 base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.41));
+    vec2 first = pow(max(i.a, 1e-30), vec2(1.41));
+    vec2 second = pow(max(o.a, 1e-30), vec2(1.41));
+    vec2 inverse = 1.0 / (base + first + second);
+    return Shares(base * inverse, first * inverse, second * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec3 lf_lean(Crossing x, Crossing i, Crossing o, vec2 alpha) {
-    vec2 own = pow(max(x.a, 1e-30), vec2(1.412));
-    vec2 total = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.412)) + pow(max(i.a, 1e-30), vec2(1.412)) + pow(max(o.a, 1e-30), vec2(1.412));
-    vec2 turn = 0.7504 * own / total;
-    vec2 y = x.w.xy - turn * (i.w.xy + o.w.xy);
-    float sine = sqrt(dot(y, y));
-    float held = min(1.0, 0.9998 / max(sine, 1e-06));
-    sine = min(sine, 0.9998);
-    return vec3(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
-}
-
-// Part of the path's spread that counts, by the base's share of the width.
-float lf_direct(float share, float d, float c, float e) {
-    return min(max(d + c * pow(max(share, 1e-30), e), 0.0), 1.5);
+vec3 lf_lean(Crossing x, Crossing i, Crossing o, vec2 share) {
+    vec2 turn = 1.099 * share * (i.w.xy + o.w.xy);
+    float z2 = x.w.z * x.w.z;
+    z2 = max(z2 + dot(turn, 2.0 * x.w.xy - turn), min(z2, 0.0004));
+    return vec3(x.w.xy - turn, sqrt(z2));
 }
 
 // Mean path of light that the base sends on: between that of one direction and that of all that cross.
@@ -284,22 +260,9 @@ float lf_between(vec3 y, Crossing x, float part) {
     return straight + part * (x.path - straight);
 }
 
-// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
-vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    float scale = max(theta, 1e-06);
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
-}
-
-// Mean of u among the paths that are left: sum of u exp(-tau u) over that of exp(-tau u).
-vec3 lf_projected(float path, float theta, vec3 tau) {
-    return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
+// How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
+vec3 lf_spread_root(float theta, vec3 tau) {
+    return sqrt(1.0 + 2.0 * theta * tau);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -314,57 +277,49 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 twice_ac = 2.0 * a * c;
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
-// 0 where the indices match and there is no interface, 1 from the first index of the tables on.
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
 float lf_presence(float eta) {
     return 2.0 - 1.0;
 }
 
-// Lambda of the GGX distribution (Heitz 2014, eq. 72).
-float lf_smith_lambda(vec3 w, vec2 alpha) {
-    float x = alpha.x * w.x;
-    float y = alpha.y * w.y;
-    float t = (x * x + y * y) / (w.z * w.z);
-    return 0.5 * t / (1.0 + sqrt(1.0 + t));
-}
-
-// D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
-float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, vec2 alpha, vec2 masked) {
-    float M = yi.z + yo.z;
-    float M2 = M * M;
-    vec2 spread = pow(max(i.a, 1e-30), vec2(1.412)) + pow(max(o.a, 1e-30), vec2(1.412));
-    vec2 width2 = pow(pow(alpha * M, vec2(1.412)) + spread, vec2(1.4164306));
-    vec2 own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float size = sqrt(width2.x * width2.y);
-    float r = 1.0 + 0.3271 * (size / sqrt(own2.x * own2.y) - 1.0);
-    r = min(r, 4.0);
-    float log_r = log(r);
-    float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
-    vec2 t = i.w.xy + o.w.xy;
-    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
-    vec2 Y = yi.xy + yo.xy;
-    float tilt = 1.0 + dot(Y, Y) / M2;
-    float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
-    return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * size * (1.0 + v * (b + r * v)));
-}
-
 // The polynomial at s; an energy is never below 0.
 vec3 lf_amount(Curve curve, float s) {
-    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper)));
+    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
+}
+
+// Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
+float lf_lobe(Crossing i, Crossing o, float M, vec2 alpha) {
+    vec2 base = alpha * M;
+    vec2 width2 = pow(max(pow(max(base, 1e-30), vec2(1.41)) + (pow(max(i.a, 1e-30), vec2(1.41)) + pow(max(o.a, 1e-30), vec2(1.41))), 1e-30), vec2(1.4184397));
+    float size = sqrt(width2.x * width2.y);
+    vec2 t = base * base + 0.3109 * (i.a * i.a + o.a * o.a);
+    float x = 0.2559 * (size / sqrt(t.x * t.y) - 1.0);
+    t = i.w.xy + o.w.xy;
+    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
+    return 1.0 / (3.1415927 * size * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
 
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 vec2 lf_wider(vec2 alpha, vec2 coat_alpha) {
-    return pow(2.0 * pow(alpha, vec2(1.412)) + 0.5751 * pow(coat_alpha, vec2(1.412)), vec2(0.7082153));
+    return pow(pow(alpha, vec2(1.41)) + pow(alpha, vec2(1.41)) + pow(0.9226 * coat_alpha, vec2(1.41)), vec2(0.7092199));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
     float back = eta * eta * dot(i.w.xy, o.w.xy);
     return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+}
+
+// Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
+float lf_seen(vec3 yi, vec3 yo, float h2, vec2 width) {
+    float M = yi.z + yo.z;
+    float slope = h2 / M;
+    float projection_i = lf_ggx_projection_anisotropic(yi, width.x, width.y);
+    float projection_o = lf_ggx_projection_anisotropic(yo, width.x, width.y);
+    return slope * slope * (yi.z * yo.z) * lf_v_smith(yi.z, yo.z, projection_i, projection_o);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
@@ -382,28 +337,27 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float throughput = crossing.T * crossing2.T / (lf_oxide.eta * lf_oxide.eta);
     vec2 top = vec2(lf_oxide.alpha_x, lf_oxide.alpha_y);
     vec2 own = vec2(lf_aluminium.alpha_x, lf_aluminium.alpha_y);
-    float share = lf_base_share(crossing, crossing2, own);
-    vec3 yi = lf_lean(crossing, crossing, crossing2, own);
-    vec3 yo = lf_lean(crossing2, crossing, crossing2, own);
-    float part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_oxide.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    float path = lf_between(yi, crossing, part);
-    vec3 U = lf_projected(path, part * crossing.theta, lf_oxide.tau);
-    part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    A = A * lf_absorbed(lf_between(yo, crossing2, part), part * crossing2.theta, lf_oxide.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    path = lf_between(yo, crossing2, part);
-    U = U * lf_projected(path, part * crossing2.theta, lf_oxide.tau);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_aluminium.eta, lf_aluminium.k);
+    Shares shares = lf_split(crossing, crossing2, own);
+    float share = 0.5 * (shares.base.x + shares.base.y);
+    float part = 0.2675 + 0.5116 * share * share;
+    vec3 yi = lf_lean(crossing, crossing, crossing2, shares.i);
+    vec3 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float path_i = lf_between(yi, crossing, part);
+    float path_o = lf_between(yo, crossing2, part);
+    vec3 root_i = lf_spread_root(part * crossing.theta, lf_oxide.tau);
+    vec3 root_o = lf_spread_root(part * crossing2.theta, lf_oxide.tau);
+    vec3 U = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
+    vec3 throughput2 = throughput * exp(-(lf_oxide.tau + (path_i - 1.0) * (2.0 * lf_oxide.tau / (1.0 + root_i)) + (lf_oxide.tau + (path_o - 1.0) * (2.0 * lf_oxide.tau / (1.0 + root_o)))));
+    vec3 h = yi + yo;
+    float h2 = dot(h, h);
+    vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float even = sqrt(0.5 * (lf_oxide.alpha_x * lf_oxide.alpha_x + lf_oxide.alpha_y * lf_oxide.alpha_y));
-    float rise = 1.0 + 0.3036 * lf_presence(lf_oxide.eta) * even * even * share;
-    float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, own, own);
+    float rise = 1.0 + 0.468 * lf_presence(lf_oxide.eta) * even * even * share;
     vec3 again = 0.5 * F2 * (lf_amount(lf_oxide_again, crossing.s) + lf_amount(lf_oxide_again, crossing2.s));
-    vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(own, top), own);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, lf_wider(own, top));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, sqrt(0.5 * (lf_aluminium.alpha_x * lf_aluminium.alpha_x + lf_aluminium.alpha_y * lf_aluminium.alpha_y)));
-    vec3 value = F * D * V + throughput * A * (F2 * U * lobes2 + rest);
+    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Conductor {
@@ -42,8 +42,6 @@ struct Curve {
     vec3 c3;  // 
     vec3 c4;  // 
     vec3 c5;  // 
-    vec3 c6;  // 
-    vec3 c7;  // 
 };
 
 struct Crossing {
@@ -55,6 +53,12 @@ struct Crossing {
     float s;      // argument of the baked curves
 };
 
+struct Shares {
+    float base;  // due to the base
+    float i;     // due to one crossing
+    float o;     // due to the other
+};
+
 const Coat lf_glass = Coat(
     0.02,                                 // alpha: width of the facet slopes; the square of an artist's roughness
     1.55,                                 // eta: index of refraction, against air
@@ -62,18 +66,18 @@ const Coat lf_glass = Coat(
 );
 
 const Interface lf_glass_interface = Interface(
-    0.0031546694,                                                  // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.0034488544, 0.010398303, -0.0076261554, 0.004548927),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.041852664, 0.044587526, 0.026298596, -0.03314644),     // passed_high: the other four, of higher powers
-    vec4(1.0013262, -0.002767831, 0.0064526796, -0.008106232),     // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.007622957, 0.009978294, 0.01659751, -0.01570177),      // bend_high: 
-    vec4(0.63525265, -0.24781588, 0.10867348, -0.16657114),        // spread: width of a lobe seen through it
-    vec4(-0.45492232, 0.4467144, 0.7791332, -0.7101705),           // spread_high: 
-    vec4(1.0033333, -0.008721083, 0.013343334, -0.009855747),      // path: mean path over that of the refracted direction
-    vec4(0.00015640259, -0.018525124, 0.04322672, -0.022779465),   // path_high: 
-    vec4(0.0047001964, -0.026050637, 0.059304968, 0.08321141),     // theta: scale of the path's distribution
-    vec4(-0.10420358, -0.31247887, 0.19300523, 0.12701222)         // theta_high: 
+    0.0031546694,                                      // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                      // gain: part of the reflected light that a second facet lets in
+    vec3(-0.0095665855, 0.02155129, -0.023891417),     // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.015120622, 0.006776768, -0.010278594),      // passed_high: the other three, of higher powers
+    vec3(0.003618297, -0.006836458, 0.0020751434),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.00092199584, 0.0109949745, -0.008830786),  // bend_high: 
+    vec3(0.7543955, -0.22650662, -0.1283072),          // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.057732522, 0.4508241, -0.40081078),        // spread_high: 
+    vec3(1.0096666, -0.020288736, 0.014123499),        // path: mean path over that of the refracted direction
+    vec3(-0.017482638, 0.037245095, -0.023303747),     // path_high: 
+    vec3(0.020642612, -0.03597436, 0.01141594),        // theta: scale of the path's distribution
+    vec3(-0.083641335, 0.14392288, -0.04268641)        // theta_high: 
 );
 
 const Conductor lf_silver = Conductor(
@@ -83,43 +87,26 @@ const Conductor lf_silver = Conductor(
 );
 
 const Curve lf_glass_again = Curve(
-    vec3(0.0038955086, 0.013052015, 0.097422406),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.00016324327, -0.0007246253, -0.0069199167),  // c1: 
-    vec3(0.002445018, 0.007881675, 0.048319273),         // c2: 
-    vec3(0.005614992, 0.018423669, 0.11570981),          // c3: 
-    vec3(-0.0068312623, -0.022907536, -0.15350443),      // c4: 
-    vec3(-0.014042489, -0.046539158, -0.29984277),       // c5: 
-    vec3(0.0046133054, 0.015405282, 0.10258162),         // c6: 
-    vec3(0.0088486485, 0.02926261, 0.18792737)           // c7: 
+    vec3(0.0039068405, 0.01311617, 0.098188706),         // c0: coefficients of the powers of the curves' argument
+    vec3(2.1855463e-05, -4.9984083e-05, -0.0018977616),  // c1: 
+    vec3(0.0003257913, 0.001216738, 0.00968701),         // c2: 
+    vec3(0.00067685684, 0.0027165357, 0.024231195),      // c3: 
+    vec3(-0.00023415149, -0.0012953002, -0.015381031),   // c4: 
+    vec3(-0.00059962785, -0.0027615484, -0.028714344)    // c5: 
 );
 
 const Curve lf_glass_rest = Curve(
-    vec3(0.2218301, 0.32766616, 0.7327889),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.029395588, -0.039315373, -0.07268259),  // c1: 
-    vec3(0.0443459, 0.042232543, 0.019262612),      // c2: 
-    vec3(0.19991082, 0.21983266, 0.23053503),       // c3: 
-    vec3(-0.12415147, -0.13390052, -0.1635921),     // c4: 
-    vec3(-0.42811108, -0.47463202, -0.54334116),    // c5: 
-    vec3(0.07025808, 0.07547802, 0.09051061),       // c6: 
-    vec3(0.24533713, 0.27184772, 0.30928683)        // c7: 
+    vec3(0.22587682, 0.3337894, 0.745916),            // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0118727945, -0.015872866, -0.033473134),  // c1: 
+    vec3(0.008570455, 0.009286493, 0.021132022),      // c2: 
+    vec3(0.040868968, 0.045088857, 0.07723862),       // c3: 
+    vec3(-0.022483155, -0.031714484, -0.086557984),   // c4: 
+    vec3(-0.042972386, -0.053251296, -0.12113875)     // c5: 
 );
 
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    float s = x / (2.0 + x);
-    float u = s * s;
-    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-    float far = log(1.0 + x);
-    return abs(x) > 0.3 ? far : near;
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
-
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -142,10 +129,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -154,14 +140,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
@@ -209,27 +192,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Part of a lobe's width, as a power, that is due to the base.
-float lf_base_share(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412);
-    return base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
+// What the width of a lobe is due to.
+Shares lf_split(Crossing i, Crossing o, float alpha) {
+    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
+    float first = pow(max(i.a, 1e-30), 1.41);
+    float second = pow(max(o.a, 1e-30), 1.41);
+    float inverse = 1.0 / (base + first + second);
+    return Shares(base * inverse, first * inverse, second * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec4 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
-    float own = pow(max(x.a, 1e-30), 1.412);
-    float total = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float turn = 0.7504 * own / total;
-    vec3 y = x.w.xyz - turn * (i.w.xyz + o.w.xyz);
-    float sine = sqrt(dot(y, y));
-    float held = min(1.0, 0.9998 / max(sine, 1e-06));
-    sine = min(sine, 0.9998);
-    return vec4(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
-}
-
-// Part of the path's spread that counts, by the base's share of the width.
-float lf_direct(float share, float d, float c, float e) {
-    return min(max(d + c * pow(max(share, 1e-30), e), 0.0), 1.5);
+vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
+    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    float z2 = x.w.w * x.w.w;
+    z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
+    return vec4(x.w.xyz - turn, sqrt(z2));
 }
 
 // Mean path of light that the base sends on: between that of one direction and that of all that cross.
@@ -238,22 +215,9 @@ float lf_between(vec4 y, Crossing x, float part) {
     return straight + part * (x.path - straight);
 }
 
-// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
-vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    float scale = max(theta, 1e-06);
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
-}
-
-// Mean of u among the paths that are left: sum of u exp(-tau u) over that of exp(-tau u).
-vec3 lf_projected(float path, float theta, vec3 tau) {
-    return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
+// How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
+vec3 lf_spread_root(float theta, vec3 tau) {
+    return sqrt(1.0 + 2.0 * theta * tau);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -268,55 +232,47 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 twice_ac = 2.0 * a * c;
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
-// 0 where the indices match and there is no interface, 1 from the first index of the tables on.
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
 float lf_presence(float eta) {
     return 2.0 - 1.0;
 }
 
-// Lambda of the GGX distribution (Heitz 2014, eq. 72).
-float lf_smith_lambda(vec4 w, float alpha) {
-    float tan2 = dot(w.xyz, w.xyz) / (w.w * w.w);
-    float x = alpha * alpha * tan2;
-    return 0.5 * x / (1.0 + sqrt(1.0 + x));
-}
-
-// D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
-float lf_lobe(Crossing i, Crossing o, vec4 yi, vec4 yo, float alpha, float masked) {
-    float M = yi.w + yo.w;
-    float M2 = M * M;
-    float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float width2 = pow(pow(alpha * M, 1.412) + spread, 1.4164306);
-    float own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float r = 1.0 + 0.3271 * (width2 / own2 - 1.0);
-    r = min(r, 4.0);
-    float log_r = log(r);
-    float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
-    vec3 t = i.w.xyz + o.w.xyz;
-    float v = dot(t, t) / width2;
-    vec3 Y = yi.xyz + yo.xyz;
-    float tilt = 1.0 + dot(Y, Y) / M2;
-    float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
-    return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * width2 * (1.0 + v * (b + r * v)));
-}
-
 // The polynomial at s; an energy is never below 0.
 vec3 lf_amount(Curve curve, float s) {
-    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
+}
+
+// Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
+float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
+    float base = alpha * M;
+    float width2 = pow(max(pow(max(base, 1e-30), 1.41) + (pow(max(i.a, 1e-30), 1.41) + pow(max(o.a, 1e-30), 1.41)), 1e-30), 1.4184397);
+    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
+    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
 
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 float lf_wider(float alpha, float coat_alpha) {
-    return pow(2.0 * pow(alpha, 1.412) + 0.5751 * pow(coat_alpha, 1.412), 0.7082153);
+    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
     float back = eta * eta * dot(i.w.xyz, o.w.xyz);
     return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+}
+
+// Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
+float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
+    float M = yi.w + yo.w;
+    float slope = h2 / M;
+    float projection_i = lf_ggx_projection(yi, width);
+    float projection_o = lf_ggx_projection(yo, width);
+    return slope * slope * (yi.w * yo.w) * lf_v_smith(yi.w, yo.w, projection_i, projection_o);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -330,27 +286,25 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_glass.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_glass.eta * lf_glass.eta);
-    float share = lf_base_share(crossing, crossing2, lf_silver.alpha);
-    vec4 yi = lf_lean(crossing, crossing, crossing2, lf_silver.alpha);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, lf_silver.alpha);
-    float part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_glass.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    float path = lf_between(yi, crossing, part);
-    vec3 U = lf_projected(path, part * crossing.theta, lf_glass.tau);
-    part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    A = A * lf_absorbed(lf_between(yo, crossing2, part), part * crossing2.theta, lf_glass.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    path = lf_between(yo, crossing2, part);
-    U = U * lf_projected(path, part * crossing2.theta, lf_glass.tau);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_silver.eta, lf_silver.k);
-    float rise = 1.0 + 0.3036 * lf_presence(lf_glass.eta) * lf_glass.alpha * lf_glass.alpha * share;
-    float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, lf_silver.alpha, lf_silver.alpha);
+    Shares shares = lf_split(crossing, crossing2, lf_silver.alpha);
+    float part = 0.2675 + 0.5116 * shares.base * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float path_i = lf_between(yi, crossing, part);
+    float path_o = lf_between(yo, crossing2, part);
+    vec3 root_i = lf_spread_root(part * crossing.theta, lf_glass.tau);
+    vec3 root_o = lf_spread_root(part * crossing2.theta, lf_glass.tau);
+    vec3 U = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
+    vec3 throughput2 = throughput * exp(-(lf_glass.tau + (path_i - 1.0) * (2.0 * lf_glass.tau / (1.0 + root_i)) + (lf_glass.tau + (path_o - 1.0) * (2.0 * lf_glass.tau / (1.0 + root_o)))));
+    vec4 h = yi + yo;
+    float h2 = dot(h, h);
+    vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_silver.eta, lf_silver.k);
+    float rise = 1.0 + 0.468 * lf_presence(lf_glass.eta) * lf_glass.alpha * lf_glass.alpha * shares.base;
     vec3 again = 0.5 * F2 * (lf_amount(lf_glass_again, crossing.s) + lf_amount(lf_glass_again, crossing2.s));
-    vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(lf_silver.alpha, lf_glass.alpha), lf_silver.alpha);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_silver.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_silver.alpha, lf_glass.alpha));
     vec3 root = lf_amount(lf_glass_rest, crossing.s) * lf_amount(lf_glass_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_glass.eta, lf_silver.alpha);
-    vec3 value = F * D * V + throughput * A * (F2 * U * lobes2 + rest);
+    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_silver.alpha) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Conductor {
@@ -43,8 +43,6 @@ struct Curve {
     vec3 c3;  // 
     vec3 c4;  // 
     vec3 c5;  // 
-    vec3 c6;  // 
-    vec3 c7;  // 
 };
 
 struct Crossing {
@@ -56,6 +54,12 @@ struct Crossing {
     float s;      // argument of the baked curves
 };
 
+struct Shares {
+    vec2 base;  // due to the base
+    vec2 i;     // due to one crossing
+    vec2 o;     // due to the other
+};
+
 const Coat lf_lacquer = Coat(
     0.05,                     // alpha: width of the facet slopes; the square of an artist's roughness
     1.5,                      // eta: index of refraction, against air
@@ -63,18 +67,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.010720346,                                                  // tilt: turn of the mean facet towards a grazing direction
-    0.009790741,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.01052308, 0.023477288, -0.025500588, 0.028245652),    // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.011960212, -0.027178146, 0.027565999, -0.004649708),  // passed_high: the other four, of higher powers
-    vec4(1.0079943, -0.01767397, 0.016312718, -0.009322643),      // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.035710335, -0.04656887, -0.0050554276, 0.019975185),   // bend_high: 
-    vec4(0.61749285, -0.2998138, -0.014232755, 0.032256246),      // spread: width of a lobe seen through it
-    vec4(0.64999557, -0.84071875, -0.21787071, 0.44369268),       // spread_high: 
-    vec4(1.0150344, -0.038873464, 0.035907388, -0.036181927),     // path: mean path over that of the refracted direction
-    vec4(0.12816024, -0.12173557, -0.06126547, 0.08013821),       // path_high: 
-    vec4(0.02877613, -0.08897024, 0.113705434, 0.018837735),      // theta: scale of the path's distribution
-    vec4(0.1763415, -0.5489767, -0.034426793, 0.36494577)         // theta_high: 
+    0.010720346,                                     // tilt: turn of the mean facet towards a grazing direction
+    0.009790741,                                     // gain: part of the reflected light that a second facet lets in
+    vec3(-0.02416102, 0.037756085, -0.01229288),     // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(-0.008737861, 0.015993359, -0.009139275),   // passed_high: the other three, of higher powers
+    vec3(0.01835048, -0.033296723, 0.02771719),      // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.019966267, 0.008862132, -0.0003390262),  // bend_high: 
+    vec3(0.75101304, -0.35615644, 0.2937088),        // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.38354492, 0.001817733, 0.06761384),      // spread_high: 
+    vec3(1.0406462, -0.08552843, 0.08595249),        // path: mean path over that of the refracted direction
+    vec3(-0.055620193, -0.0024152398, 0.018114805),  // path_high: 
+    vec3(0.08841845, -0.19763331, 0.23841499),       // theta: scale of the path's distribution
+    vec3(-0.2506254, 0.060514007, 0.080532625)       // theta_high: 
 );
 
 const Conductor lf_brass = Conductor(
@@ -85,43 +89,26 @@ const Conductor lf_brass = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.14026329, 0.13573436, 0.12811396),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.014493188, -0.014055347, -0.014592197),  // c1: 
-    vec3(-0.015537135, -0.015983894, -0.017167784),  // c2: 
-    vec3(-0.05080408, -0.051041454, -0.05157438),    // c3: 
-    vec3(-0.042325675, -0.03960505, -0.035563707),   // c4: 
-    vec3(0.059901237, 0.061502635, 0.06317812),      // c5: 
-    vec3(0.034853935, 0.03317955, 0.03112474),       // c6: 
-    vec3(-0.024258435, -0.02523613, -0.02606374)     // c7: 
+    vec3(0.14512728, 0.14044529, 0.13300277),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0060996544, -0.0057417415, -0.0058122594),  // c1: 
+    vec3(-0.0026760548, -0.0028334, -0.0032775812),     // c2: 
+    vec3(0.0047100484, 0.0035177618, 0.00075277686),    // c3: 
+    vec3(-0.025664493, -0.024776977, -0.023785159),     // c4: 
+    vec3(-0.028431416, -0.026775666, -0.024223797)      // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.8147626, 0.69875133, 0.43752003),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.090359345, -0.07973543, -0.05853676),       // c1: 
-    vec3(-0.10216439, -0.094714284, -0.06996918),       // c2: 
-    vec3(-0.059845686, -0.059993982, -0.045384884),     // c3: 
-    vec3(0.01195097, 0.016742468, 0.016967535),         // c4: 
-    vec3(-0.044057846, -0.02707386, -0.012820959),      // c5: 
-    vec3(-0.00050258636, -0.002742052, -0.0022482276),  // c6: 
-    vec3(0.04125142, 0.031652212, 0.020432949)          // c7: 
+    vec3(0.8352855, 0.71676904, 0.45101696),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.042650893, -0.036231443, -0.025202997),  // c1: 
+    vec3(0.02819249, 0.023769334, 0.013604745),      // c2: 
+    vec3(0.010055304, 0.0022403598, -0.0085222125),  // c3: 
+    vec3(-0.13798976, -0.12151852, -0.08213316),     // c4: 
+    vec3(-0.11965972, -0.10060024, -0.06240341)      // c5: 
 );
 
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    float s = x / (2.0 + x);
-    float u = s * s;
-    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-    float far = log(1.0 + x);
-    return abs(x) > 0.3 ? far : near;
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
-
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -144,10 +131,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -156,14 +142,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xy, w.xy));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.z * w.z + (1.0 - bend) * (1.0 + bend) * dot(w.xy, w.xy));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec3(w.xy * bend, z), T, a, path, theta, s);
 }
 
@@ -211,28 +194,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Part of a lobe's width, as a power, that is due to the base.
-float lf_base_share(Crossing i, Crossing o, vec2 alpha) {
-    vec2 base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.412));
-    vec2 t = base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
-    return 0.5 * (t.x + t.y);
+// What the width of a lobe is due to.
+Shares lf_split(Crossing i, Crossing o, vec2 alpha) {
+    vec2 base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.41));
+    float first = pow(max(i.a, 1e-30), 1.41);
+    float second = pow(max(o.a, 1e-30), 1.41);
+    vec2 inverse = 1.0 / (base + first + second);
+    return Shares(base * inverse, first * inverse, second * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec3 lf_lean(Crossing x, Crossing i, Crossing o, vec2 alpha) {
-    float own = pow(max(x.a, 1e-30), 1.412);
-    vec2 total = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.412)) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    vec2 turn = 0.7504 * own / total;
-    vec2 y = x.w.xy - turn * (i.w.xy + o.w.xy);
-    float sine = sqrt(dot(y, y));
-    float held = min(1.0, 0.9998 / max(sine, 1e-06));
-    sine = min(sine, 0.9998);
-    return vec3(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
-}
-
-// Part of the path's spread that counts, by the base's share of the width.
-float lf_direct(float share, float d, float c, float e) {
-    return min(max(d + c * pow(max(share, 1e-30), e), 0.0), 1.5);
+vec3 lf_lean(Crossing x, Crossing i, Crossing o, vec2 share) {
+    vec2 turn = 1.099 * share * (i.w.xy + o.w.xy);
+    float z2 = x.w.z * x.w.z;
+    z2 = max(z2 + dot(turn, 2.0 * x.w.xy - turn), min(z2, 0.0004));
+    return vec3(x.w.xy - turn, sqrt(z2));
 }
 
 // Mean path of light that the base sends on: between that of one direction and that of all that cross.
@@ -241,22 +217,9 @@ float lf_between(vec3 y, Crossing x, float part) {
     return straight + part * (x.path - straight);
 }
 
-// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
-vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    float scale = max(theta, 1e-06);
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
-}
-
-// Mean of u among the paths that are left: sum of u exp(-tau u) over that of exp(-tau u).
-vec3 lf_projected(float path, float theta, vec3 tau) {
-    return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
+// How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
+vec3 lf_spread_root(float theta, vec3 tau) {
+    return sqrt(1.0 + 2.0 * theta * tau);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -271,63 +234,56 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 twice_ac = 2.0 * a * c;
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
-// 0 where the indices match and there is no interface, 1 from the first index of the tables on.
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
 float lf_presence(float eta) {
     return 2.0 - 1.0;
 }
 
-// Lambda of the GGX distribution (Heitz 2014, eq. 72).
-float lf_smith_lambda(vec3 w, vec2 alpha) {
-    float x = alpha.x * w.x;
-    float y = alpha.y * w.y;
-    float t = (x * x + y * y) / (w.z * w.z);
-    return 0.5 * t / (1.0 + sqrt(1.0 + t));
-}
-
-// D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
-float lf_lobe(Crossing i, Crossing o, vec3 yi, vec3 yo, vec2 alpha, vec2 masked) {
-    float M = yi.z + yo.z;
-    float M2 = M * M;
-    float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    vec2 width2 = pow(pow(alpha * M, vec2(1.412)) + spread, vec2(1.4164306));
-    vec2 own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float size = sqrt(width2.x * width2.y);
-    float r = 1.0 + 0.3271 * (size / sqrt(own2.x * own2.y) - 1.0);
-    r = min(r, 4.0);
-    float log_r = log(r);
-    float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
-    vec2 t = i.w.xy + o.w.xy;
-    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
-    vec2 Y = yi.xy + yo.xy;
-    float tilt = 1.0 + dot(Y, Y) / M2;
-    float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
-    return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * size * (1.0 + v * (b + r * v)));
-}
-
 // The polynomial at s; an energy is never below 0.
 vec3 lf_amount(Curve curve, float s) {
-    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
+}
+
+// Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
+float lf_lobe(Crossing i, Crossing o, float M, vec2 alpha) {
+    vec2 base = alpha * M;
+    vec2 width2 = pow(max(pow(max(base, 1e-30), vec2(1.41)) + (pow(max(i.a, 1e-30), 1.41) + pow(max(o.a, 1e-30), 1.41)), 1e-30), vec2(1.4184397));
+    float size = sqrt(width2.x * width2.y);
+    vec2 t = base * base + 0.3109 * (i.a * i.a + o.a * o.a);
+    float x = 0.2559 * (size / sqrt(t.x * t.y) - 1.0);
+    t = i.w.xy + o.w.xy;
+    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
+    return 1.0 / (3.1415927 * size * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
 
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 vec2 lf_wider(vec2 alpha, float coat_alpha) {
-    return pow(2.0 * pow(alpha, vec2(1.412)) + 0.5751 * pow(coat_alpha, 1.412), vec2(0.7082153));
-}
-
-// The polynomial at s; an energy is never below 0.
-vec3 lf_amount2(Curve curve, float s) {
-    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper)));
+    return pow(pow(alpha, vec2(1.41)) + pow(alpha, vec2(1.41)) + pow(0.9226 * coat_alpha, 1.41), vec2(0.7092199));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
     float back = eta * eta * dot(i.w.xy, o.w.xy);
     return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+}
+
+// NoW (1 + 2 Lambda) of the anisotropic GGX distribution (Heitz 2014, eqs. 72 and 80).
+float lf_ggx_projection_anisotropic(vec3 w, float alpha_x, float alpha_y) {
+    float x = alpha_x * w.x;
+    float y = alpha_y * w.y;
+    return sqrt(w.z * w.z + x * x + y * y);
+}
+
+// Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
+float lf_seen(vec3 yi, vec3 yo, float h2, vec2 width) {
+    float M = yi.z + yo.z;
+    float slope = h2 / M;
+    float projection_i = lf_ggx_projection_anisotropic(yi, width.x, width.y);
+    float projection_o = lf_ggx_projection_anisotropic(yo, width.x, width.y);
+    return slope * slope * (yi.z * yo.z) * lf_v_smith(yi.z, yo.z, projection_i, projection_o);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
@@ -342,27 +298,26 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_lacquer.eta * lf_lacquer.eta);
     vec2 own = vec2(lf_brass.alpha_x, lf_brass.alpha_y);
-    float share = lf_base_share(crossing, crossing2, own);
-    vec3 yi = lf_lean(crossing, crossing, crossing2, own);
-    vec3 yo = lf_lean(crossing2, crossing, crossing2, own);
-    float part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_lacquer.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    float path = lf_between(yi, crossing, part);
-    vec3 U = lf_projected(path, part * crossing.theta, lf_lacquer.tau);
-    part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    A = A * lf_absorbed(lf_between(yo, crossing2, part), part * crossing2.theta, lf_lacquer.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    path = lf_between(yo, crossing2, part);
-    U = U * lf_projected(path, part * crossing2.theta, lf_lacquer.tau);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_brass.eta, lf_brass.k);
-    float rise = 1.0 + 0.3036 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * share;
-    float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, own, own);
+    Shares shares = lf_split(crossing, crossing2, own);
+    float share = 0.5 * (shares.base.x + shares.base.y);
+    float part = 0.2675 + 0.5116 * share * share;
+    vec3 yi = lf_lean(crossing, crossing, crossing2, shares.i);
+    vec3 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float path_i = lf_between(yi, crossing, part);
+    float path_o = lf_between(yo, crossing2, part);
+    vec3 root_i = lf_spread_root(part * crossing.theta, lf_lacquer.tau);
+    vec3 root_o = lf_spread_root(part * crossing2.theta, lf_lacquer.tau);
+    vec3 U = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
+    vec3 throughput2 = throughput * exp(-(lf_lacquer.tau + (path_i - 1.0) * (2.0 * lf_lacquer.tau / (1.0 + root_i)) + (lf_lacquer.tau + (path_o - 1.0) * (2.0 * lf_lacquer.tau / (1.0 + root_o)))));
+    vec3 h = yi + yo;
+    float h2 = dot(h, h);
+    vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_brass.eta, lf_brass.k);
+    float rise = 1.0 + 0.468 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * share;
     vec3 again = 0.5 * F2 * (lf_amount(lf_lacquer_again, crossing.s) + lf_amount(lf_lacquer_again, crossing2.s));
-    vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(own, lf_lacquer.alpha), own);
-    vec3 root = lf_amount2(lf_lacquer_rest, crossing.s) * lf_amount2(lf_lacquer_rest, crossing2.s);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, lf_wider(own, lf_lacquer.alpha));
+    vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, sqrt(0.5 * (lf_brass.alpha_x * lf_brass.alpha_x + lf_brass.alpha_y * lf_brass.alpha_y)));
-    vec3 value = F * D * V + throughput * A * (F2 * U * lobes2 + rest);
+    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Lambert {
@@ -46,18 +46,18 @@ const Coat lf_clear_coat = Coat(
 );
 
 const Interface lf_clear_coat_interface = Interface(
-    0.0031546694,                                                  // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.0034458803, 0.010561833, -0.007803324, 0.00443758),    // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.04236394, 0.045712262, 0.026629591, -0.03396063),      // passed_high: the other four, of higher powers
-    vec4(1.0012292, -0.0025921464, 0.0060585737, -0.0076346397),   // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.007080078, 0.009326935, 0.015559435, -0.014722824),    // bend_high: 
-    vec4(0.6099778, -0.25085667, 0.10746345, -0.15689087),         // spread: width of a lobe seen through it
-    vec4(-0.44062424, 0.42988992, 0.7542081, -0.6864612),          // spread_high: 
-    vec4(1.0026617, -0.008133531, 0.013874054, -0.010201454),      // path: mean path over that of the refracted direction
-    vec4(0.00049066544, -0.019371033, 0.043243885, -0.022409916),  // path_high: 
-    vec4(0.004407661, -0.02435562, 0.055455465, 0.074570626),      // theta: scale of the path's distribution
-    vec4(-0.09615714, -0.2850346, 0.18171528, 0.11182524)          // theta_high: 
+    0.0031546694,                                     // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                     // gain: part of the reflected light that a second facet lets in
+    vec3(-0.00965715, 0.021873731, -0.0242624),       // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.015375613, 0.0068878005, -0.010487776),    // passed_high: the other three, of higher powers
+    vec3(0.0033821939, -0.0064339936, 0.001987853),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.00090263993, 0.010334163, -0.008277145),  // bend_high: 
+    vec3(0.72952676, -0.2272397, -0.12848555),        // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.058554053, 0.43840846, -0.38560963),      // spread_high: 
+    vec3(1.009759, -0.020711154, 0.014585555),        // path: mean path over that of the refracted direction
+    vec3(-0.017857552, 0.037453353, -0.02328682),     // path_high: 
+    vec3(0.019467048, -0.03448579, 0.0112755345),     // theta: scale of the path's distribution
+    vec3(-0.07768409, 0.13575086, -0.04182259)        // theta_high: 
 );
 
 const Lambert lf_paint = Lambert(
@@ -66,9 +66,9 @@ const Lambert lf_paint = Lambert(
 
 const float lf_paint_returned = 0.5947464;
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -91,10 +91,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -103,14 +102,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 

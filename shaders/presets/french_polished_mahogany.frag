@@ -16,16 +16,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -49,18 +49,18 @@ const Coat lf_shellac = Coat(
 );
 
 const Interface lf_shellac_interface = Interface(
-    0.0031546694,                                                  // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.0034473583, 0.010492936, -0.0077287657, 0.004481966),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.04213125, 0.04522743, 0.026484784, -0.03361556),       // passed_high: the other four, of higher powers
-    vec4(1.0012681, -0.0026634336, 0.0062196255, -0.007826328),    // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.0073018074, 0.009594917, 0.015981913, -0.015120983),   // bend_high: 
-    vec4(0.62042105, -0.2497138, 0.10796586, -0.16095579),         // spread: width of a lobe seen through it
-    vec4(-0.44668567, 0.4370501, 0.7647935, -0.6965437),           // spread_high: 
-    vec4(1.0028697, -0.008274883, 0.013679743, -0.010127544),      // path: mean path over that of the refracted direction
-    vec4(0.00033450127, -0.019001007, 0.04324889, -0.022566319),   // path_high: 
-    vec4(0.00452326, -0.025034625, 0.057004232, 0.078058206),      // theta: scale of the path's distribution
-    vec4(-0.099412814, -0.2961239, 0.18628639, 0.11796043)         // theta_high: 
+    0.0031546694,                                     // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                     // gain: part of the reflected light that a second facet lets in
+    vec3(-0.009618692, 0.021733595, -0.024097253),    // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.0152621865, 0.0068437173, -0.0104005365),  // passed_high: the other three, of higher powers
+    vec3(0.003477717, -0.0065967487, 0.002022285),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.00091052987, 0.01060319, -0.008502161),   // bend_high: 
+    vec3(0.7398473, -0.22701198, -0.12849008),        // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.05826497, 0.44370586, -0.39202416),       // spread_high: 
+    vec3(1.0097235, -0.02054125, 0.014399737),        // path: mean path over that of the refracted direction
+    vec3(-0.017715454, 0.037379563, -0.02329731),     // path_high: 
+    vec3(0.019935852, -0.035078302, 0.011336705),     // theta: scale of the path's distribution
+    vec3(-0.08009496, 0.13903353, -0.042160243)       // theta_high: 
 );
 
 const OrenNayar lf_mahogany = OrenNayar(
@@ -68,20 +68,7 @@ const OrenNayar lf_mahogany = OrenNayar(
     0.2                       // sigma: standard deviation of the facet angle [rad]
 );
 
-const vec3 lf_mahogany_returned = vec3(0.4617034, 0.30869326, 0.13005143);
-
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    float s = x / (2.0 + x);
-    float u = s * s;
-    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-    float far = log(1.0 + x);
-    return abs(x) > 0.3 ? far : near;
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
+const vec3 lf_mahogany_returned = vec3(0.46170345, 0.30869326, 0.13005142);
 
 // Angle of the point (x, y) by a polynomial (relative error 2e-8): some drivers' atan is off by 2e-4.
 float lf_atan2(float y, float x) {
@@ -96,9 +83,9 @@ float lf_atan2(float y, float x) {
     return y < 0.0 ? -a : a;
 }
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -121,10 +108,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -133,14 +119,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
@@ -188,9 +171,9 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
-vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(theta * tau) / theta)));
+// How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
+vec3 lf_spread_root(float theta, vec3 tau) {
+    return sqrt(1.0 + 2.0 * theta * tau);
 }
 
 // Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection.
@@ -238,8 +221,9 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_shellac.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_shellac.eta * lf_shellac.eta);
-    vec3 A = lf_absorbed(crossing.path, crossing.theta, lf_shellac.tau) * lf_absorbed(crossing2.path, crossing2.theta, lf_shellac.tau);
-    vec3 value = F * D * V + throughput * A * lf_oren_nayar_full(crossing.w, crossing2.w, lf_mahogany.albedo, lf_mahogany.sigma) / (1.0 - lf_mahogany.albedo * lf_mahogany_returned);
+    vec3 once = lf_shellac.tau + (crossing.path - 1.0) * (2.0 * lf_shellac.tau / (1.0 + lf_spread_root(crossing.theta, lf_shellac.tau)));
+    vec3 throughput2 = throughput * exp(-(once + (lf_shellac.tau + (crossing2.path - 1.0) * (2.0 * lf_shellac.tau / (1.0 + lf_spread_root(crossing2.theta, lf_shellac.tau))))));
+    vec3 value = F * D * V + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_mahogany.albedo, lf_mahogany.sigma) / (1.0 - lf_mahogany.albedo * lf_mahogany_returned);
     return lit ? value : vec3(0.0);
 }
 

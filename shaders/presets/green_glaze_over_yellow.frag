@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Lambert {
@@ -46,29 +46,29 @@ const Coat lf_varnish = Coat(
 );
 
 const Interface lf_varnish_interface = Interface(
-    0.019120084,                                                 // tilt: turn of the mean facet towards a grazing direction
-    0.02422721,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.017708257, 0.031569272, -0.022334382, 0.008231912),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(0.028344193, -0.04514841, -0.003954705, 0.019649286),   // passed_high: the other four, of higher powers
-    vec4(1.0192075, -0.039161414, 0.040671587, -0.03711748),     // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.056702375, -0.035250664, -0.03293705, 0.031222343),   // bend_high: 
-    vec4(0.6141141, -0.303111, 0.13000849, -0.27796412),         // spread: width of a lobe seen through it
-    vec4(0.41097283, -0.108875036, -0.2716086, 0.17487288),      // spread_high: 
-    vec4(1.0303978, -0.07386291, 0.0952425, -0.11105347),        // path: mean path over that of the refracted direction
-    vec4(0.09069204, 0.010650635, -0.07378054, 0.03361559),      // path_high: 
-    vec4(0.061837524, -0.16732457, 0.2526343, -0.15407254),      // theta: scale of the path's distribution
-    vec4(0.10470186, -0.26747897, -0.06905809, 0.27396303)       // theta_high: 
+    0.019120084,                                       // tilt: turn of the mean facet towards a grazing direction
+    0.02422721,                                        // gain: part of the reflected light that a second facet lets in
+    vec3(-0.0321689, 0.029983805, 0.015549282),        // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(-0.015668225, 0.0009908297, -1.5788479e-05),  // passed_high: the other three, of higher powers
+    vec3(0.04254398, -0.0714967, 0.046763185),         // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.016578522, -0.005647372, 0.0077653723),    // bend_high: 
+    vec3(0.7752975, -0.4359295, 0.25017366),           // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.13368165, -0.13237008, 0.048883975),       // spread_high: 
+    vec3(1.080001, -0.1521383, 0.09882036),            // path: mean path over that of the refracted direction
+    vec3(-0.01597774, -0.025762916, 0.01699841),       // path_high: 
+    vec3(0.19103706, -0.40984368, 0.36370075),         // theta: scale of the path's distribution
+    vec3(-0.20119762, -0.042300656, 0.12330281)        // theta_high: 
 );
 
 const Lambert lf_paint = Lambert(
     vec3(0.13824189, 0.3258238, 0.014077428)   // albedo: part of the light that is sent back
 );
 
-const float lf_paint_returned = 0.57148385;
+const float lf_paint_returned = 0.5714839;
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -91,10 +91,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -103,14 +102,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 

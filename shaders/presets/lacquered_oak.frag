@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -47,18 +47,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.0514843,                                                   // tilt: turn of the mean facet towards a grazing direction
-    0.11758662,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.044123273, 0.0313489, 0.035952635, -0.015859963),    // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.049893208, 0.032095604, 0.018541448, -0.015914109),  // passed_high: the other four, of higher powers
-    vec4(1.0923163, -0.14482683, 0.10542214, -0.015247345),      // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.061389208, 0.052412987, 0.012805223, -0.021101952),  // bend_high: 
-    vec4(0.5745852, -0.24817641, 0.038347483, 0.057667613),      // spread: width of a lobe seen through it
-    vec4(-0.11041272, 0.028030872, 0.048333287, -0.024249315),   // spread_high: 
-    vec4(1.0971808, -0.19768837, 0.16345799, -0.022169828),      // path: mean path over that of the refracted direction
-    vec4(-0.120443344, 0.10083866, 0.03151059, -0.044627666),    // path_high: 
-    vec4(0.21468692, -0.46145743, 0.4567174, -0.06859344),       // theta: scale of the path's distribution
-    vec4(-0.3475721, 0.13788506, 0.12286827, -0.0039697587)      // theta_high: 
+    0.0514843,                                      // tilt: turn of the mean facet towards a grazing direction
+    0.11758662,                                     // gain: part of the reflected light that a second facet lets in
+    vec3(-0.051513065, 0.0059220353, 0.011182629),  // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.04249962, 0.0011268947, -0.016593136),   // passed_high: the other three, of higher powers
+    vec3(0.15997663, -0.15549923, -0.020663086),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(0.030586995, 0.009913275, -0.0038092807),  // bend_high: 
+    vec3(0.67365825, -0.17226803, -0.10509278),     // spread: width of a lobe seen through it, over that of the facets
+    vec3(0.01729983, -0.011321053, -0.033619165),   // spread_high: 
+    vec3(1.2000802, -0.23994064, -0.020671934),     // path: mean path over that of the refracted direction
+    vec3(0.067613125, 0.011690021, -0.010590792),   // path_high: 
+    vec3(0.59302557, -0.9069695, 0.14514132),       // theta: scale of the path's distribution
+    vec3(0.23783478, -0.018604606, -0.007173978)    // theta_high: 
 );
 
 const OrenNayar lf_oak = OrenNayar(
@@ -66,7 +66,7 @@ const OrenNayar lf_oak = OrenNayar(
     0.3                     // sigma: standard deviation of the facet angle [rad]
 );
 
-const float lf_oak_returned = 0.4951992;
+const float lf_oak_returned = 0.49519914;
 
 // Angle of the point (x, y) by a polynomial (relative error 2e-8): some drivers' atan is off by 2e-4.
 float lf_atan2(float y, float x) {
@@ -81,9 +81,9 @@ float lf_atan2(float y, float x) {
     return y < 0.0 ? -a : a;
 }
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -106,10 +106,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -118,14 +117,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 

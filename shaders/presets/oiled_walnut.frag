@@ -16,16 +16,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -49,18 +49,18 @@ const Coat lf_oil = Coat(
 );
 
 const Interface lf_oil_interface = Interface(
-    0.07902597,                                                    // tilt: turn of the mean facet towards a grazing direction
-    0.21274194,                                                    // gain: part of the reflected light that a second facet lets in
-    vec4(-0.07798231, 0.058746383, 0.0075020567, 0.041144893),     // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.047764577, -0.019874156, 0.023969818, -0.0016629249),  // passed_high: the other four, of higher powers
-    vec4(1.1669741, -0.1808559, 0.039536238, 0.06320357),          // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.034553528, -0.018116951, 0.011247635, 0.002400875),    // bend_high: 
-    vec4(0.47853708, -0.080600925, -0.09847978, 0.04845512),       // spread: width of a lobe seen through it
-    vec4(0.035307884, -0.040828705, -0.006877303, 0.01240921),     // spread_high: 
-    vec4(1.1355146, -0.22439307, 0.11154938, 0.046013832),         // path: mean path over that of the refracted direction
-    vec4(-0.09534407, 0.036819458, 0.02803421, -0.02294445),       // path_high: 
-    vec4(0.31047225, -0.5736654, 0.39680478, 0.07639581),          // theta: scale of the path's distribution
-    vec4(-0.3474359, 0.121623755, 0.12213464, -0.048579425)        // theta_high: 
+    0.07902597,                                     // tilt: turn of the mean facet towards a grazing direction
+    0.21274194,                                     // gain: part of the reflected light that a second facet lets in
+    vec3(-0.102022186, 0.05346267, -0.00935491),    // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.032929197, 0.017657153, -0.007665964),   // passed_high: the other three, of higher powers
+    vec3(0.23614359, -0.13058884, -0.07147114),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.016634904, 0.018470109, 0.013866931),   // bend_high: 
+    vec3(0.49851844, 0.0006311983, -0.054577872),   // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.049606323, -0.030749634, -0.01205802),  // spread_high: 
+    vec3(1.2460318, -0.2314046, -0.064879),         // path: mean path over that of the refracted direction
+    vec3(0.04211855, 0.02292329, 0.00061380863),    // path_high: 
+    vec3(0.8084004, -1.0369201, -0.056403957),      // theta: scale of the path's distribution
+    vec3(0.32752085, 0.052598123, -0.038988426)     // theta_high: 
 );
 
 const OrenNayar lf_walnut = OrenNayar(
@@ -68,20 +68,7 @@ const OrenNayar lf_walnut = OrenNayar(
     0.35                      // sigma: standard deviation of the facet angle [rad]
 );
 
-const vec3 lf_walnut_returned = vec3(0.34568194, 0.29054964, 0.2114556);
-
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    float s = x / (2.0 + x);
-    float u = s * s;
-    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-    float far = log(1.0 + x);
-    return abs(x) > 0.3 ? far : near;
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
+const vec3 lf_walnut_returned = vec3(0.3456819, 0.29054958, 0.2114556);
 
 // Angle of the point (x, y) by a polynomial (relative error 2e-8): some drivers' atan is off by 2e-4.
 float lf_atan2(float y, float x) {
@@ -96,9 +83,9 @@ float lf_atan2(float y, float x) {
     return y < 0.0 ? -a : a;
 }
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -121,10 +108,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -133,14 +119,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = min((1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta, 1.0);
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
@@ -188,9 +171,9 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
-vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(theta * tau) / theta)));
+// How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
+vec3 lf_spread_root(float theta, vec3 tau) {
+    return sqrt(1.0 + 2.0 * theta * tau);
 }
 
 // Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection.
@@ -238,8 +221,9 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_oil.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_oil.eta * lf_oil.eta);
-    vec3 A = lf_absorbed(crossing.path, crossing.theta, lf_oil.tau) * lf_absorbed(crossing2.path, crossing2.theta, lf_oil.tau);
-    vec3 value = F * D * V + throughput * A * lf_oren_nayar_full(crossing.w, crossing2.w, lf_walnut.albedo, lf_walnut.sigma) / (1.0 - lf_walnut.albedo * lf_walnut_returned);
+    vec3 once = lf_oil.tau + (crossing.path - 1.0) * (2.0 * lf_oil.tau / (1.0 + lf_spread_root(crossing.theta, lf_oil.tau)));
+    vec3 throughput2 = throughput * exp(-(once + (lf_oil.tau + (crossing2.path - 1.0) * (2.0 * lf_oil.tau / (1.0 + lf_spread_root(crossing2.theta, lf_oil.tau))))));
+    vec3 value = F * D * V + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_walnut.albedo, lf_walnut.sigma) / (1.0 - lf_walnut.albedo * lf_walnut_returned);
     return lit ? value : vec3(0.0);
 }
 

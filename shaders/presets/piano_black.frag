@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Lambert {
@@ -46,29 +46,29 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.0031546694,                                                   // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                   // gain: part of the reflected light that a second facet lets in
-    vec4(-0.0034488004, 0.0103678815, -0.0075934757, 0.004570787),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.041773263, 0.044395477, 0.026241926, -0.033003),        // passed_high: the other four, of higher powers
-    vec4(1.0013454, -0.0028029084, 0.0065283775, -0.008193016),     // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.007724762, 0.010098457, 0.016797781, -0.015884876),     // bend_high: 
-    vec4(0.6400186, -0.24715656, 0.10890156, -0.16834033),          // spread: width of a lobe seen through it
-    vec4(-0.45751202, 0.44973493, 0.7836082, -0.71441746),          // spread_high: 
-    vec4(1.0034646, -0.008854955, 0.013246894, -0.009762049),       // path: mean path over that of the refracted direction
-    vec4(9.10759e-05, -0.018375397, 0.043212652, -0.022842884),     // path_high: 
-    vec4(0.004760144, -0.026387703, 0.06006642, 0.08489863),        // theta: scale of the path's distribution
-    vec4(-0.10577611, -0.3178431, 0.19521162, 0.12998304)           // theta_high: 
+    0.0031546694,                                    // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                    // gain: part of the reflected light that a second facet lets in
+    vec3(-0.009549635, 0.021495357, -0.023831615),   // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.015080304, 0.006754711, -0.0102405865),   // passed_high: the other three, of higher powers
+    vec3(0.003664461, -0.00691487, 0.0020934881),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.0009270547, 0.011122103, -0.008937338),  // bend_high: 
+    vec3(0.75904995, -0.2263068, -0.12822342),       // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.057531953, 0.45303166, -0.40356708),     // spread_high: 
+    vec3(1.009647, -0.020205349, 0.0140322745),      // path: mean path over that of the refracted direction
+    vec3(-0.017401814, 0.037196398, -0.023304224),   // path_high: 
+    vec3(0.020879557, -0.03627545, 0.011439269),     // theta: scale of the path's distribution
+    vec3(-0.084810555, 0.14554596, -0.042862482)     // theta_high: 
 );
 
 const Lambert lf_black = Lambert(
     0.003   // albedo: part of the light that is sent back
 );
 
-const float lf_black_returned = 0.6288917;
+const float lf_black_returned = 0.62889177;
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -91,10 +91,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -103,14 +102,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 

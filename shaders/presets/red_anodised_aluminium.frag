@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Conductor {
@@ -42,8 +42,6 @@ struct Curve {
     vec3 c3;  // 
     vec3 c4;  // 
     vec3 c5;  // 
-    vec3 c6;  // 
-    vec3 c7;  // 
 };
 
 struct Crossing {
@@ -55,6 +53,12 @@ struct Crossing {
     float s;      // argument of the baked curves
 };
 
+struct Shares {
+    float base;  // due to the base
+    float i;     // due to one crossing
+    float o;     // due to the other
+};
+
 const Coat lf_oxide = Coat(
     0.18,                               // alpha: width of the facet slopes; the square of an artist's roughness
     1.65,                               // eta: index of refraction, against air
@@ -62,18 +66,18 @@ const Coat lf_oxide = Coat(
 );
 
 const Interface lf_oxide_interface = Interface(
-    0.046419457,                                                // tilt: turn of the mean facet towards a grazing direction
-    0.10031511,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.03934908, 0.026510041, 0.032650657, -0.022436477),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.0328139, 0.028090157, 0.009836316, -0.011298083),   // passed_high: the other four, of higher powers
-    vec4(1.0975682, -0.15713224, 0.12942672, -0.04542494),      // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.057476997, 0.07574177, 0.00493145, -0.026343346),   // bend_high: 
-    vec4(0.6633578, -0.2969889, 0.117569864, -0.015428543),     // spread: width of a lobe seen through it
-    vec4(-0.15508735, 0.123889685, 0.053566456, -0.060361385),  // spread_high: 
-    vec4(1.0968367, -0.19205412, 0.17082345, -0.050070286),     // path: mean path over that of the refracted direction
-    vec4(-0.11193919, 0.120594025, 0.024900675, -0.04971552),   // path_high: 
-    vec4(0.23706682, -0.47861528, 0.46576566, -0.08105126),     // theta: scale of the path's distribution
-    vec4(-0.3500735, 0.1520657, 0.12560432, -0.0066952407)      // theta_high: 
+    0.046419457,                                    // tilt: turn of the mean facet towards a grazing direction
+    0.10031511,                                     // gain: part of the reflected light that a second facet lets in
+    vec3(-0.04464719, 0.00010519335, 0.016922252),  // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.03386515, -0.0017023832, -0.012983762),  // passed_high: the other three, of higher powers
+    vec3(0.17456408, -0.18511207, -0.0043630255),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(0.038041946, 0.00433427, -0.0060364865),   // bend_high: 
+    vec3(0.79491526, -0.2609493, -0.08429666),      // spread: width of a lobe seen through it, over that of the facets
+    vec3(0.0621534, -0.023329884, -0.05259615),     // spread_high: 
+    vec3(1.1995243, -0.24667987, -0.003308177),     // path: mean path over that of the refracted direction
+    vec3(0.06897068, 0.004082501, -0.013128996),    // path_high: 
+    vec3(0.6451652, -0.96579504, 0.16259342),       // theta: scale of the path's distribution
+    vec3(0.2337165, -0.020245273, 0.0012745932)     // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -83,43 +87,26 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.22808345, 0.00959671, 0.0141336555),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.015580945, 0.0007176779, 0.00087863486),      // c1: 
-    vec3(-0.0106060505, -0.00023954548, -0.00040571392),  // c2: 
-    vec3(0.001920402, 0.00060905144, 0.0007808693),       // c3: 
-    vec3(-0.03087449, -0.0011516586, -0.001744248),       // c4: 
-    vec3(-0.014986157, -0.0011394545, -0.0015514866),     // c5: 
-    vec3(0.015454948, 0.00066001154, 0.00097639114),      // c6: 
-    vec3(0.0068992376, 0.00044305995, 0.00058896095)      // c7: 
+    vec3(0.23598553, 0.009446396, 0.013970923),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0018371381, 0.0009900501, 0.0013158042),     // c1: 
+    vec3(-0.00017692894, 0.00013058586, 0.00020230422),  // c2: 
+    vec3(0.02096942, 0.00079319905, 0.0012610499),       // c3: 
+    vec3(-0.025554813, -0.00029719993, -0.0006149998),   // c4: 
+    vec3(-0.035292953, -0.0008371426, -0.0014300738)     // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.6999073, 0.22104251, 0.25068143),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.046449557, -0.00191167, -0.0037898198),     // c1: 
-    vec3(-0.035253763, -0.0097338855, -0.012095615),    // c2: 
-    vec3(-0.019189358, -0.011288345, -0.012324333),     // c3: 
-    vec3(-0.019810915, -0.008430481, -0.008526683),     // c4: 
-    vec3(-0.021903515, -0.00021076202, -0.0003299713),  // c5: 
-    vec3(0.0047801733, -0.00030082464, -9.274483e-05),  // c6: 
-    vec3(0.014694452, -0.0007996559, -0.00043606758)    // c7: 
+    vec3(0.71114016, 0.22015995, 0.2501617),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.027400091, -0.0022967122, -0.002828829),  // c1: 
+    vec3(0.013535261, 0.010971412, 0.010952234),      // c2: 
+    vec3(0.037034333, 0.024226218, 0.024282217),      // c3: 
+    vec3(-0.07314843, -0.027332574, -0.029907405),    // c4: 
+    vec3(-0.08125186, -0.035438, -0.037620604)        // c5: 
 );
 
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    float s = x / (2.0 + x);
-    float u = s * s;
-    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-    float far = log(1.0 + x);
-    return abs(x) > 0.3 ? far : near;
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
-
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -142,10 +129,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -154,14 +140,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
-    float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
@@ -209,27 +192,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Part of a lobe's width, as a power, that is due to the base.
-float lf_base_share(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412);
-    return base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
+// What the width of a lobe is due to.
+Shares lf_split(Crossing i, Crossing o, float alpha) {
+    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
+    float first = pow(i.a, 1.41);
+    float second = pow(o.a, 1.41);
+    float inverse = 1.0 / (base + first + second);
+    return Shares(base * inverse, first * inverse, second * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec4 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
-    float own = pow(max(x.a, 1e-30), 1.412);
-    float total = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float turn = 0.7504 * own / total;
-    vec3 y = x.w.xyz - turn * (i.w.xyz + o.w.xyz);
-    float sine = sqrt(dot(y, y));
-    float held = min(1.0, 0.9998 / max(sine, 1e-06));
-    sine = min(sine, 0.9998);
-    return vec4(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
-}
-
-// Part of the path's spread that counts, by the base's share of the width.
-float lf_direct(float share, float d, float c, float e) {
-    return min(max(d + c * pow(max(share, 1e-30), e), 0.0), 1.5);
+vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
+    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    float z2 = x.w.w * x.w.w;
+    z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
+    return vec4(x.w.xyz - turn, sqrt(z2));
 }
 
 // Mean path of light that the base sends on: between that of one direction and that of all that cross.
@@ -238,22 +215,9 @@ float lf_between(vec4 y, Crossing x, float part) {
     return straight + part * (x.path - straight);
 }
 
-// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
-vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    float scale = max(theta, 1e-06);
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
-}
-
-// Mean of u among the paths that are left: sum of u exp(-tau u) over that of exp(-tau u).
-vec3 lf_projected(float path, float theta, vec3 tau) {
-    return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
+// How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
+vec3 lf_spread_root(float theta, vec3 tau) {
+    return sqrt(1.0 + 2.0 * theta * tau);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -268,55 +232,47 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 twice_ac = 2.0 * a * c;
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
-// 0 where the indices match and there is no interface, 1 from the first index of the tables on.
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
 float lf_presence(float eta) {
     return 2.0 - 1.0;
 }
 
-// Lambda of the GGX distribution (Heitz 2014, eq. 72).
-float lf_smith_lambda(vec4 w, float alpha) {
-    float tan2 = dot(w.xyz, w.xyz) / (w.w * w.w);
-    float x = alpha * alpha * tan2;
-    return 0.5 * x / (1.0 + sqrt(1.0 + x));
-}
-
-// D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
-float lf_lobe(Crossing i, Crossing o, vec4 yi, vec4 yo, float alpha, float masked) {
-    float M = yi.w + yo.w;
-    float M2 = M * M;
-    float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float width2 = pow(pow(alpha * M, 1.412) + spread, 1.4164306);
-    float own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float r = 1.0 + 0.3271 * (width2 / own2 - 1.0);
-    r = min(r, 4.0);
-    float log_r = log(r);
-    float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
-    vec3 t = i.w.xyz + o.w.xyz;
-    float v = dot(t, t) / width2;
-    vec3 Y = yi.xyz + yo.xyz;
-    float tilt = 1.0 + dot(Y, Y) / M2;
-    float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
-    return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * width2 * (1.0 + v * (b + r * v)));
-}
-
 // The polynomial at s; an energy is never below 0.
 vec3 lf_amount(Curve curve, float s) {
-    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper)));
+    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
+}
+
+// Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
+float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
+    float base = alpha * M;
+    float width2 = pow(pow(max(base, 1e-30), 1.41) + (pow(i.a, 1.41) + pow(o.a, 1.41)), 1.4184397);
+    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
+    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
 
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 float lf_wider(float alpha, float coat_alpha) {
-    return pow(2.0 * pow(alpha, 1.412) + 0.5751 * pow(coat_alpha, 1.412), 0.7082153);
+    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
     float back = eta * eta * dot(i.w.xyz, o.w.xyz);
     return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+}
+
+// Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
+float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
+    float M = yi.w + yo.w;
+    float slope = h2 / M;
+    float projection_i = lf_ggx_projection(yi, width);
+    float projection_o = lf_ggx_projection(yo, width);
+    return slope * slope * (yi.w * yo.w) * lf_v_smith(yi.w, yo.w, projection_i, projection_o);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -330,27 +286,25 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_oxide.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_oxide.eta * lf_oxide.eta);
-    float share = lf_base_share(crossing, crossing2, lf_aluminium.alpha);
-    vec4 yi = lf_lean(crossing, crossing, crossing2, lf_aluminium.alpha);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, lf_aluminium.alpha);
-    float part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_oxide.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    float path = lf_between(yi, crossing, part);
-    vec3 U = lf_projected(path, part * crossing.theta, lf_oxide.tau);
-    part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    A = A * lf_absorbed(lf_between(yo, crossing2, part), part * crossing2.theta, lf_oxide.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    path = lf_between(yo, crossing2, part);
-    U = U * lf_projected(path, part * crossing2.theta, lf_oxide.tau);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_aluminium.eta, lf_aluminium.k);
-    float rise = 1.0 + 0.3036 * lf_presence(lf_oxide.eta) * lf_oxide.alpha * lf_oxide.alpha * share;
-    float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, lf_aluminium.alpha, lf_aluminium.alpha);
+    Shares shares = lf_split(crossing, crossing2, lf_aluminium.alpha);
+    float part = 0.2675 + 0.5116 * shares.base * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float path_i = lf_between(yi, crossing, part);
+    float path_o = lf_between(yo, crossing2, part);
+    vec3 root_i = lf_spread_root(part * crossing.theta, lf_oxide.tau);
+    vec3 root_o = lf_spread_root(part * crossing2.theta, lf_oxide.tau);
+    vec3 U = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
+    vec3 throughput2 = throughput * exp(-(lf_oxide.tau + (path_i - 1.0) * (2.0 * lf_oxide.tau / (1.0 + root_i)) + (lf_oxide.tau + (path_o - 1.0) * (2.0 * lf_oxide.tau / (1.0 + root_o)))));
+    vec4 h = yi + yo;
+    float h2 = dot(h, h);
+    vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
+    float rise = 1.0 + 0.468 * lf_presence(lf_oxide.eta) * lf_oxide.alpha * lf_oxide.alpha * shares.base;
     vec3 again = 0.5 * F2 * (lf_amount(lf_oxide_again, crossing.s) + lf_amount(lf_oxide_again, crossing2.s));
-    vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(lf_aluminium.alpha, lf_oxide.alpha), lf_aluminium.alpha);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_oxide.alpha));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, lf_aluminium.alpha);
-    vec3 value = F * D * V + throughput * A * (F2 * U * lobes2 + rest);
+    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

@@ -16,16 +16,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Lambert {
@@ -48,42 +48,29 @@ const Coat lf_urushi = Coat(
 );
 
 const Interface lf_urushi_interface = Interface(
-    0.008038055,                                                 // tilt: turn of the mean facet towards a grazing direction
-    0.006316437,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.008072356, 0.019486737, -0.020731423, 0.024424378),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.03145446, 0.00013677985, 0.03702873, -0.021245457),  // passed_high: the other four, of higher powers
-    vec4(1.0053927, -0.012037039, 0.013071418, -0.00825429),     // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.016440153, -0.026238441, 0.009810686, 0.0027136803),  // bend_high: 
-    vec4(0.63280284, -0.29555434, -0.024730414, 0.11218488),     // spread: width of a lobe seen through it
-    vec4(0.47719383, -0.84418964, 0.026913643, 0.3005638),       // spread_high: 
-    vec4(1.010907, -0.028521657, 0.02203238, -0.013605595),      // path: mean path over that of the refracted direction
-    vec4(0.102348804, -0.12650013, -0.030620098, 0.064911366),   // path_high: 
-    vec4(0.020297723, -0.06835176, 0.08423227, 0.07202018),      // theta: scale of the path's distribution
-    vec4(0.12120235, -0.5703243, 0.032188267, 0.33836395)        // theta_high: 
+    0.008038055,                                      // tilt: turn of the mean facet towards a grazing direction
+    0.006316437,                                      // gain: part of the reflected light that a second facet lets in
+    vec3(-0.019861361, 0.03569795, -0.021563128),     // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.00021134847, 0.018127924, -0.0131169055),  // passed_high: the other three, of higher powers
+    vec3(0.012738822, -0.02335022, 0.017746096),      // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.013947411, 0.014163258, -0.0065295324),   // bend_high: 
+    vec3(0.7574944, -0.30959716, 0.21663982),         // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.3939808, 0.14949118, -0.03164667),        // spread_high: 
+    vec3(1.028744, -0.061100483, 0.06624964),         // path: mean path over that of the refracted direction
+    vec3(-0.053946853, 0.014147878, 0.0067489147),    // path_high: 
+    vec3(0.06297798, -0.1371728, 0.16691335),         // theta: scale of the path's distribution
+    vec3(-0.22109175, 0.1095863, 0.037178833)         // theta_high: 
 );
 
 const Lambert lf_cinnabar = Lambert(
     vec3(0.58, 0.07, 0.03)   // albedo: part of the light that is sent back
 );
 
-const vec3 lf_cinnabar_returned = vec3(0.4255121, 0.1857792, 0.06779367);
+const vec3 lf_cinnabar_returned = vec3(0.4255121, 0.18577918, 0.06779366);
 
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    float s = x / (2.0 + x);
-    float u = s * s;
-    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-    float far = log(1.0 + x);
-    return abs(x) > 0.3 ? far : near;
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
-
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -106,10 +93,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -118,14 +104,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
@@ -173,9 +156,9 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
-vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(theta * tau) / theta)));
+// How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
+vec3 lf_spread_root(float theta, vec3 tau) {
+    return sqrt(1.0 + 2.0 * theta * tau);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -189,8 +172,9 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_urushi.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_urushi.eta * lf_urushi.eta);
-    vec3 A = lf_absorbed(crossing.path, crossing.theta, lf_urushi.tau) * lf_absorbed(crossing2.path, crossing2.theta, lf_urushi.tau);
-    vec3 value = F * D * V + throughput * A * (lf_cinnabar.albedo / 3.1415927) / (1.0 - lf_cinnabar.albedo * lf_cinnabar_returned);
+    vec3 once = lf_urushi.tau + (crossing.path - 1.0) * (2.0 * lf_urushi.tau / (1.0 + lf_spread_root(crossing.theta, lf_urushi.tau)));
+    vec3 throughput2 = throughput * exp(-(once + (lf_urushi.tau + (crossing2.path - 1.0) * (2.0 * lf_urushi.tau / (1.0 + lf_spread_root(crossing2.theta, lf_urushi.tau))))));
+    vec3 value = F * D * V + throughput2 * (lf_cinnabar.albedo / 3.1415927) / (1.0 - lf_cinnabar.albedo * lf_cinnabar_returned);
     return lit ? value : vec3(0.0);
 }
 

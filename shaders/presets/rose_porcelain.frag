@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Lambert {
@@ -46,29 +46,29 @@ const Coat lf_glaze = Coat(
 );
 
 const Interface lf_glaze_interface = Interface(
-    0.0054883463,                                                 // tilt: turn of the mean facet towards a grazing direction
-    0.0035753467,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.005732365, 0.01541617, -0.015023942, 0.016766172),    // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.04286533, 0.02535144, 0.037844244, -0.03205738),      // passed_high: the other four, of higher powers
-    vec4(1.0028795, -0.0064911246, 0.009341955, -0.0077381134),   // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.000739336, -0.0053653717, 0.016946077, -0.009879112),  // bend_high: 
-    vec4(0.6145934, -0.2803265, 0.014296442, 0.060772896),        // spread: width of a lobe seen through it
-    vec4(0.1096195, -0.4286635, 0.34889567, -0.069693565),        // spread_high: 
-    vec4(1.0063267, -0.018037766, 0.0151439905, -0.004645586),    // path: mean path over that of the refracted direction
-    vec4(0.058966875, -0.092886925, 0.005291939, 0.03040266),     // path_high: 
-    vec4(0.011289647, -0.044573322, 0.061082434, 0.08958986),     // theta: scale of the path's distribution
-    vec4(0.02857621, -0.4663041, 0.10433317, 0.24140999)          // theta_high: 
+    0.0054883463,                                    // tilt: turn of the mean facet towards a grazing direction
+    0.0035753467,                                    // gain: part of the reflected light that a second facet lets in
+    vec3(-0.0151992105, 0.03096597, -0.026210945),   // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.008551259, 0.015562363, -0.01404037),     // passed_high: the other three, of higher powers
+    vec3(0.007215311, -0.013483647, 0.008252899),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.0067420173, 0.014364195, -0.009246089),  // bend_high: 
+    vec3(0.73397744, -0.26290506, 0.06938703),       // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.28459442, 0.29432896, -0.17842531),      // spread_high: 
+    vec3(1.0184151, -0.03971079, 0.042724967),       // path: mean path over that of the refracted direction
+    vec3(-0.04176557, 0.027597368, -0.006858945),    // path_high: 
+    vec3(0.03754024, -0.07790418, 0.08442601),       // theta: scale of the path's distribution
+    vec3(-0.15448993, 0.13333824, -0.008031782)      // theta_high: 
 );
 
 const Lambert lf_paint = Lambert(
     vec3(0.6914125, 0.1957665, 0.46559197)   // albedo: part of the light that is sent back
 );
 
-const float lf_paint_returned = 0.59207493;
+const float lf_paint_returned = 0.5920748;
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -91,10 +91,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -103,14 +102,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 

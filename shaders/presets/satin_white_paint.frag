@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Lambert {
@@ -46,29 +46,29 @@ const Coat lf_surface = Coat(
 );
 
 const Interface lf_surface_interface = Interface(
-    0.08523813,                                                  // tilt: turn of the mean facet towards a grazing direction
-    0.23253432,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.08829561, 0.06921207, -0.0025319979, 0.046828307),   // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.03677714, -0.02923125, 0.019881316, 0.0019443259),   // passed_high: the other four, of higher powers
-    vec4(1.1908898, -0.18565702, 0.023200512, 0.06637478),       // bend: sine of the refracted light over that at a smooth interface
-    vec4(-0.022238255, -0.021943092, 0.0071253777, 0.00404644),  // bend_high: 
-    vec4(0.4670237, -0.05129976, -0.09916952, 0.02692759),       // spread: width of a lobe seen through it
-    vec4(0.041081667, -0.027884007, -0.010092378, 0.008688688),  // spread_high: 
-    vec4(1.1454061, -0.22828844, 0.104338646, 0.048077583),      // path: mean path over that of the refracted direction
-    vec4(-0.09155941, 0.036605835, 0.027258635, -0.02371645),    // path_high: 
-    vec4(0.33835986, -0.5951677, 0.3756616, 0.09792897),         // theta: scale of the path's distribution
-    vec4(-0.33255088, 0.12613332, 0.11371158, -0.0620794)        // theta_high: 
+    0.08523813,                                      // tilt: turn of the mean facet towards a grazing direction
+    0.23253432,                                      // gain: part of the reflected light that a second facet lets in
+    vec3(-0.117580555, 0.06625485, -0.008904142),    // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(0.026615268, 0.019321598, -0.003716942),    // passed_high: the other three, of higher powers
+    vec3(0.25976497, -0.125767, -0.07634101),        // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.027794093, 0.01541426, 0.016349174),     // bend_high: 
+    vec3(0.47685713, 0.016207732, -0.037082642),     // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.043587685, -0.036313757, -0.016467094),  // spread_high: 
+    vec3(1.2581091, -0.2329101, -0.069290906),       // path: mean path over that of the refracted direction
+    vec3(0.040067196, 0.022291899, 1.013279e-05),    // path_high: 
+    vec3(0.86954325, -1.0685096, -0.09935013),       // theta: scale of the path's distribution
+    vec3(0.33906257, 0.066010416, -0.044408634)      // theta_high: 
 );
 
 const Lambert lf_paint = Lambert(
     vec3(0.88637257, 0.8831154, 0.8736719)   // albedo: part of the light that is sent back
 );
 
-const float lf_paint_returned = 0.39094654;
+const float lf_paint_returned = 0.3909465;
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -91,10 +91,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -103,14 +102,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = min((1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta, 1.0);
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 

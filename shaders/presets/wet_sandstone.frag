@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -47,18 +47,18 @@ const Coat lf_water = Coat(
 );
 
 const Interface lf_water_interface = Interface(
-    0.010720346,                                                   // tilt: turn of the mean facet towards a grazing direction
-    0.009790741,                                                   // gain: part of the reflected light that a second facet lets in
-    vec4(-0.010589275, 0.026426984, -0.030074373, 0.029473977),    // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(-0.012584978, -0.026241383, 0.029236952, -0.0059260046),  // passed_high: the other four, of higher powers
-    vec4(1.0056586, -0.013114661, 0.012718558, -0.007781267),      // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.027127743, -0.034430504, -0.004564047, 0.015298367),    // bend_high: 
-    vec4(0.5028955, -0.28704393, -0.0034859776, 0.03659773),       // spread: width of a lobe seen through it
-    vec4(0.52095413, -0.66590023, -0.18564248, 0.3577906),         // spread_high: 
-    vec4(1.0132684, -0.038382113, 0.038725495, -0.0390594),        // path: mean path over that of the refracted direction
-    vec4(0.12731934, -0.117129326, -0.06448269, 0.080534935),      // path_high: 
-    vec4(0.02159865, -0.07141954, 0.08778606, 0.007408768),        // theta: scale of the path's distribution
-    vec4(0.16657797, -0.43504852, -0.036707543, 0.27958158)        // theta_high: 
+    0.010720346,                                      // tilt: turn of the mean facet towards a grazing direction
+    0.009790741,                                      // gain: part of the reflected light that a second facet lets in
+    vec3(-0.026004575, 0.04301408, -0.014314687),     // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(-0.010176732, 0.016221277, -0.00915219),     // passed_high: the other three, of higher powers
+    vec3(0.013477275, -0.02535109, 0.021349104),      // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.014621947, 0.0060912133, -6.445672e-05),  // bend_high: 
+    vec3(0.62818056, -0.31912512, 0.21570803),        // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.312871, -0.00026713312, 0.06709802),      // spread_high: 
+    vec3(1.0396754, -0.087372005, 0.08643025),        // path: mean path over that of the refracted direction
+    vec3(-0.052160025, -0.005214095, 0.01943636),     // path_high: 
+    vec3(0.06900233, -0.16027227, 0.19247234),        // theta: scale of the path's distribution
+    vec3(-0.19428445, 0.05203541, 0.05342995)         // theta_high: 
 );
 
 const OrenNayar lf_stone = OrenNayar(
@@ -66,7 +66,7 @@ const OrenNayar lf_stone = OrenNayar(
     0.6                     // sigma: standard deviation of the facet angle [rad]
 );
 
-const float lf_stone_returned = 0.4601485;
+const float lf_stone_returned = 0.46014845;
 
 // Angle of the point (x, y) by a polynomial (relative error 2e-8): some drivers' atan is off by 2e-4.
 float lf_atan2(float y, float x) {
@@ -81,9 +81,9 @@ float lf_atan2(float y, float x) {
     return y < 0.0 ? -a : a;
 }
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -106,10 +106,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -118,14 +117,11 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 

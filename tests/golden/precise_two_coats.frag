@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
-    vec4 passed_high;  // the other four, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface
-    vec4 bend_high;    // 
-    vec4 spread;       // width of a lobe seen through it
-    vec4 spread_high;  // 
-    vec4 path;         // mean path over that of the refracted direction
-    vec4 path_high;    // 
-    vec4 theta;        // scale of the path's distribution
-    vec4 theta_high;   // 
+    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
+    vec3 passed_high;  // the other three, of higher powers
+    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec3 bend_high;    // 
+    vec3 spread;       // width of a lobe seen through it, over that of the facets
+    vec3 spread_high;  // 
+    vec3 path;         // mean path over that of the refracted direction
+    vec3 path_high;    // 
+    vec3 theta;        // scale of the path's distribution
+    vec3 theta_high;   // 
 };
 
 struct Curve {
@@ -36,8 +36,6 @@ struct Curve {
     vec3 c3;  // 
     vec3 c4;  // 
     vec3 c5;  // 
-    vec3 c6;  // 
-    vec3 c7;  // 
 };
 
 struct Conductor {
@@ -55,6 +53,12 @@ struct Crossing {
     float s;      // argument of the baked curves
 };
 
+struct Shares {
+    float base;  // due to the base
+    float i;     // due to one crossing
+    float o;     // due to the other
+};
+
 const Coat lf_coat = Coat(
     0.1,                   // alpha: width of the facet slopes; the square of an artist's roughness
     1.5,                   // eta: index of refraction, against air
@@ -68,66 +72,60 @@ const Coat lf_primer = Coat(
 );
 
 const Interface lf_coat_top = Interface(
-    0.024779005,                                                  // tilt: turn of the mean facet towards a grazing direction
-    0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.022298388, 0.03387798, -0.0103099225, -0.013259102),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(0.028962415, -0.021387354, -0.01196556, 0.014177172),    // passed_high: the other four, of higher powers
-    vec4(1.0287149, -0.05618003, 0.06226027, -0.05720377),        // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.041371346, 0.003288269, -0.03387451, 0.016711235),     // bend_high: 
-    vec4(0.6110438, -0.30916816, 0.19031203, -0.31476402),        // spread: width of a lobe seen through it
-    vec4(0.14646864, 0.20258307, -0.14906263, -0.01018548),       // spread_high: 
-    vec4(1.0417676, -0.09941718, 0.13050604, -0.13191032),        // path: mean path over that of the refracted direction
-    vec4(0.031531334, 0.0896492, -0.051778316, -0.0077610016),    // path_high: 
-    vec4(0.08719435, -0.22555345, 0.33561954, -0.21172841),       // theta: scale of the path's distribution
-    vec4(-0.014265373, -0.082942754, -0.03109099, 0.18081078)     // theta_high: 
+    0.024779005,                                         // tilt: turn of the mean facet towards a grazing direction
+    0.036722906,                                         // gain: part of the reflected light that a second facet lets in
+    vec3(-0.035054997, 0.020641431, 0.025624495),        // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(-0.0064411927, -0.0061165085, -0.00076546334),  // passed_high: the other three, of higher powers
+    vec3(0.06184196, -0.096420236, 0.046584222),         // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.0025666347, -0.009934818, 0.005613242),      // bend_high: 
+    vec3(0.7778974, -0.42731008, 0.14473301),            // spread: width of a lobe seen through it, over that of the facets
+    vec3(0.0003119707, -0.11521681, -0.009224892),       // spread_high: 
+    vec3(1.1060052, -0.18565032, 0.08457264),            // path: mean path over that of the refracted direction
+    vec3(0.017342567, -0.025979936, 0.0063171387),       // path_high: 
+    vec3(0.26631966, -0.53991795, 0.37586775),           // theta: scale of the path's distribution
+    vec3(-0.10775492, -0.07368938, 0.10674948)           // theta_high: 
 );
 
 const Interface lf_coat_both = Interface(
-    0.024779005,                                                  // tilt: turn of the mean facet towards a grazing direction
-    0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.022298388, 0.03387798, -0.0103099225, -0.013259102),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec4(0.028962415, -0.021387354, -0.01196556, 0.014177172),    // passed_high: the other four, of higher powers
-    vec4(0.8740273, -0.052167535, 0.051979005, -0.050500393),     // bend: sine of the refracted light over that at a smooth interface
-    vec4(0.038603067, 0.0008864403, -0.03025961, 0.015664577),    // bend_high: 
-    vec4(0.08601386, -0.025296396, 0.011873268, -0.024669722),    // spread: width of a lobe seen through it
-    vec4(0.013517067, 0.012449205, -0.012207478, 0.0010761321),   // spread_high: 
-    vec4(1.0279282, -0.044994652, 0.050734162, -0.05081415),      // path: mean path over that of the refracted direction
-    vec4(-0.010020494, 0.06349468, -0.011087894, -0.020304203),   // path_high: 
-    vec4(0.029751584, -0.0662639, 0.10902027, -0.075114295),      // theta: scale of the path's distribution
-    vec4(-0.063635595, 0.067949235, 0.014836162, 0.005317107)     // theta_high: 
+    0.024779005,                                         // tilt: turn of the mean facet towards a grazing direction
+    0.036722906,                                         // gain: part of the reflected light that a second facet lets in
+    vec3(-0.035054997, 0.020641431, 0.025624495),        // passed: energy that passes, beyond the closed form: three coefficients
+    vec3(-0.0064411927, -0.0061165085, -0.00076546334),  // passed_high: the other three, of higher powers
+    vec3(-0.09620379, -0.08588411, 0.040890552),         // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec3(-0.0041511953, -0.010286503, 0.0039637834),     // bend_high: 
+    vec3(0.09954319, -0.03336258, 0.012172839),          // spread: width of a lobe seen through it, over that of the facets
+    vec3(-0.000896357, -0.011329744, -0.0025816858),     // spread_high: 
+    vec3(1.0546784, -0.071492076, 0.017656565),          // path: mean path over that of the refracted direction
+    vec3(0.017326593, -0.010948837, -0.0020993948),      // path_high: 
+    vec3(0.08373786, -0.15304142, 0.076810524),          // theta: scale of the path's distribution
+    vec3(0.021043582, -0.03042803, 0.017840791)          // theta_high: 
 );
 
 const Curve lf_coat_passed = Curve(
-    vec3(0.98590416, 0.98274827, 0.9786481),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.008991003, -0.0015498996, 0.0073432326),    // c1: 
-    vec3(0.0045963526, 0.0022250414, 0.00077331066),    // c2: 
-    vec3(0.019406796, 0.015256643, 0.008446455),        // c3: 
-    vec3(0.0017943382, -0.0030956268, -0.0067255497),   // c4: 
-    vec3(-0.017215729, -0.0086221695, -0.00020313263),  // c5: 
-    vec3(-0.0032730103, -0.00019955635, 0.0024578571),  // c6: 
-    vec3(0.0069413185, 0.0022859573, -0.001868248)      // c7: 
+    vec3(0.98885643, 0.9825332, 0.9749934),            // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0048447847, 0.0019959807, 0.008327693),    // c1: 
+    vec3(-0.008213818, -0.0080194175, -0.0050720274),  // c2: 
+    vec3(-0.003549695, -0.00045204163, 0.0027159452),  // c3: 
+    vec3(0.008597374, 0.007260442, 0.005341053),       // c4: 
+    vec3(0.008965015, 0.006336689, 0.003130436)        // c5: 
 );
 
 const Curve lf_coat_inner_again = Curve(
-    vec3(0.36035553, 0.18331626, 0.04803365),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.13232316, -0.045524586, -0.0070955837),   // c1: 
-    vec3(-0.034575596, -0.023965627, -0.005745411),   // c2: 
-    vec3(-0.18139237, -0.06928861, -0.018667795),     // c3: 
-    vec3(0.028492987, 0.014148682, 0.0033291504),     // c4: 
-    vec3(0.28883004, 0.079076886, 0.026420683),       // c5: 
-    vec3(-0.008797705, -0.0046216547, -0.003297791),  // c6: 
-    vec3(-0.1482085, -0.038752258, -0.014876187)      // c7: 
+    vec3(0.4179882, 0.20252796, 0.051290553),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.11138961, -0.038174868, -0.0070435656),  // c1: 
+    vec3(-0.010335572, 0.010543928, 0.0037405444),   // c2: 
+    vec3(-0.013854086, 0.002419129, 0.006826367),    // c3: 
+    vec3(-0.0576986, -0.04098332, -0.011538604),     // c4: 
+    vec3(-0.046957374, -0.038040474, -0.013467476)   // c5: 
 );
 
 const Curve lf_coat_inner_rest = Curve(
-    vec3(0.087790474, 0.07042574, 0.045924775),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.02835534, -0.01922483, -0.010248066),       // c1: 
-    vec3(-0.011888631, -0.00852045, -0.005970752),      // c2: 
-    vec3(-0.022531852, -0.013223067, -0.01009953),      // c3: 
-    vec3(0.016208053, 0.0052274615, 0.0011859313),      // c4: 
-    vec3(0.021609515, 0.0026581287, 0.006765574),       // c5: 
-    vec3(-0.0061142594, -0.00038327277, 0.0004287958),  // c6: 
-    vec3(-0.006678909, 0.0027749538, -0.0015668869)     // c7: 
+    vec3(0.09805314, 0.07698309, 0.049282067),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.020066546, -0.0134933945, -0.006903533),   // c1: 
+    vec3(-0.0010522045, 0.0019353423, 0.0010899659),   // c2: 
+    vec3(-0.015770428, -0.0074732043, -0.0020022579),  // c3: 
+    vec3(-0.011498058, -0.012468461, -0.008895351),    // c4: 
+    vec3(-0.00020448864, -0.006140966, -0.006234452)   // c5: 
 );
 
 const Conductor lf_base = Conductor(
@@ -137,39 +135,22 @@ const Conductor lf_base = Conductor(
 );
 
 const Curve lf_coat_again = Curve(
-    vec3(0.10702271, 0.18307614, 0.08630123),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.007968048, -0.020511333, -0.01219501),      // c1: 
-    vec3(0.00070624053, -0.0061041564, -0.0032450035),  // c2: 
-    vec3(0.0043961406, 0.012475193, -0.002338171),      // c3: 
-    vec3(-0.027675599, -0.023697019, -0.010627672),     // c4: 
-    vec3(-0.04561591, -0.081035495, -0.021730304),      // c5: 
-    vec3(0.017712146, 0.01457122, 0.0063140094),        // c6: 
-    vec3(0.034206867, 0.056613088, 0.016384244)         // c7: 
+    vec3(0.113116995, 0.19614387, 0.09464168),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.003125159, -0.009682316, -0.008773306),  // c1: 
+    vec3(0.009188551, 0.012916118, 0.0062840655),    // c2: 
+    vec3(0.003690794, -0.002083853, 0.0048566237),   // c3: 
+    vec3(-0.019095294, -0.03156826, -0.017753974),   // c4: 
+    vec3(-0.013327986, -0.017953917, -0.015910782)   // c5: 
 );
 
 const Curve lf_coat_rest = Curve(
-    vec3(0.47436747, 0.36414498, 0.23059379),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.030093208, -0.031955607, -0.029816736),    // c1: 
-    vec3(-0.010827452, -0.0049446225, -0.0026966631),  // c2: 
-    vec3(0.13356602, 0.05502546, 0.006746471),         // c3: 
-    vec3(-0.024067163, -0.032443047, -0.021829665),    // c4: 
-    vec3(-0.3667345, -0.18902922, -0.05388701),        // c5: 
-    vec3(0.0031433105, 0.023648977, 0.013657093),      // c6: 
-    vec3(0.21675205, 0.1236186, 0.03609693)            // c7: 
+    vec3(0.47580683, 0.37167534, 0.24029636),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.013003029, -0.016848952, -0.022144116),  // c1: 
+    vec3(0.04136744, 0.015886202, 0.006957695),      // c2: 
+    vec3(0.032524347, -0.0036183, 0.00915277),       // c3: 
+    vec3(-0.072989866, -0.03821455, -0.027350068),   // c4: 
+    vec3(-0.065988004, -0.023336709, -0.028268516)   // c5: 
 );
-
-// log(1 + x) without the cancellation near 0.
-float lf_log1p(float x) {
-    float s = x / (2.0 + x);
-    float u = s * s;
-    float near = 2.0 * s * (1.0 + u * (1.0 / 3.0 + u * (1.0 / 5.0 + u * (1.0 / 7.0 + u * (1.0 / 9.0 + u / 11.0)))));
-    float far = log(1.0 + x);
-    return abs(x) > 0.3 ? far : near;
-}
-
-vec3 lf_log1p(vec3 x) {
-    return vec3(lf_log1p(x.x), lf_log1p(x.y), lf_log1p(x.z));
-}
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
@@ -215,9 +196,9 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
-// Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1.
+// Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
 float lf_grazing(float NoW) {
-    return max(2.0 * (sqrt(NoW) - 0.16179292) / 0.83820707 - 1.0, -1.0);
+    return max(1.4645134 - 0.55741614 / (NoW + 0.2), -1.0);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -240,10 +221,9 @@ float lf_with_second_facet(float T, float gain) {
     return T + (1.0 - T) * gain;
 }
 
-// A polynomial of eight coefficients at s.
-float lf_curve(vec4 low, vec4 high, float s) {
-    float upper = high.x + s * (high.y + s * (high.z + s * high.w));
-    return low.x + s * (low.y + s * (low.z + s * (low.w + s * upper)));
+// A polynomial of six coefficients at s.
+float lf_curve(vec3 low, vec3 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
 }
 
 // Follow one direction through the coat's rough top.
@@ -252,49 +232,39 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = lf_curve(interface_.bend, interface_.bend_high, s) / eta;
-    float sine = sqrt(dot(w.xyz, w.xyz));
-    bend = min(bend, 0.9998 / max(sine, 1e-06));
-    sine = sine * bend;
-    float z = sqrt(max((1.0 - sine) * (1.0 + sine), 0.0));
-    float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
+    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
+    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
-    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 1e-04);
+    float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
     return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
 }
 
-// 0 where the indices match and there is no interface, 1 from the first index of the tables on.
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
 float lf_presence(float eta) {
     return 2.0 - 1.0;
 }
 
 // The polynomial at s; an energy is never below 0.
 vec3 lf_amount(Curve curve, float s) {
-    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper)));
+    return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
 }
 
-// Part of a lobe's width, as a power, that is due to the base.
-float lf_base_share(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412);
-    return base / (base + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412));
-}
-
-// Part of the path's spread that counts, by the base's share of the width.
-float lf_direct(float share, float d, float c, float e) {
-    return min(max(d + c * pow(max(share, 1e-30), e), 0.0), 1.5);
+// What the width of a lobe is due to.
+Shares lf_split(Crossing i, Crossing o, float alpha) {
+    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
+    float first = pow(i.a, 1.41);
+    float second = pow(o.a, 1.41);
+    float inverse = 1.0 / (base + first + second);
+    return Shares(base * inverse, first * inverse, second * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec4 lf_lean(Crossing x, Crossing i, Crossing o, float alpha) {
-    float own = pow(max(x.a, 1e-30), 1.412);
-    float total = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.412) + pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float turn = 0.7504 * own / total;
-    vec3 y = x.w.xyz - turn * (i.w.xyz + o.w.xyz);
-    float sine = sqrt(dot(y, y));
-    float held = min(1.0, 0.9998 / max(sine, 1e-06));
-    sine = min(sine, 0.9998);
-    return vec4(y * held, sqrt((1.0 - sine) * (1.0 + sine)));
+vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
+    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    float z2 = x.w.w * x.w.w;
+    z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
+    return vec4(x.w.xyz - turn, sqrt(z2));
 }
 
 // A direction below a smooth boundary, as it is above it; `eta` is the index below over that above.
@@ -312,65 +282,39 @@ float lf_between(vec4 y, Crossing x, float part) {
     return straight + part * (x.path - straight);
 }
 
-// Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta.
-vec3 lf_absorbed(float path, float theta, vec3 tau) {
-    float scale = max(theta, 1e-06);
-    return exp(-(tau + max(path - 1.0, 1e-09) * (lf_log1p(scale * tau) / scale)));
+// How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
+vec3 lf_spread_root(float theta, vec3 tau) {
+    return sqrt(1.0 + 2.0 * theta * tau);
 }
 
-// Mean of u among the paths that are left: sum of u exp(-tau u) over that of exp(-tau u).
-vec3 lf_projected(float path, float theta, vec3 tau) {
-    return 1.0 + max(path - 1.0, 1e-09) / (1.0 + max(theta, 1e-06) * tau);
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
-// Lambda of the GGX distribution (Heitz 2014, eq. 72).
-float lf_smith_lambda(vec4 w, float alpha) {
-    float tan2 = dot(w.xyz, w.xyz) / (w.w * w.w);
-    float x = alpha * alpha * tan2;
-    return 0.5 * x / (1.0 + sqrt(1.0 + x));
-}
-
-// D G / 4 of a base of width alpha, seen through the interface twice; `masked` is the width that shadows itself.
-float lf_lobe(Crossing i, Crossing o, vec4 yi, vec4 yo, float alpha, float masked) {
-    float M = yi.w + yo.w;
-    float M2 = M * M;
-    float spread = pow(max(i.a, 1e-30), 1.412) + pow(max(o.a, 1e-30), 1.412);
-    float width2 = pow(pow(alpha * M, 1.412) + spread, 1.4164306);
-    float own2 = alpha * alpha * M2 + 0.5566 * (i.a * i.a + o.a * o.a);
-    float r = 1.0 + 0.3271 * (width2 / own2 - 1.0);
-    r = min(r, 4.0);
-    float log_r = log(r);
-    float b = 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r));
+// Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
+float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
+    float base = alpha * M;
+    float width2 = pow(pow(max(base, 1e-30), 1.41) + (pow(i.a, 1.41) + pow(o.a, 1.41)), 1.4184397);
+    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
     vec3 t = i.w.xyz + o.w.xyz;
     float v = dot(t, t) / width2;
-    vec3 Y = yi.xyz + yo.xyz;
-    float tilt = 1.0 + dot(Y, Y) / M2;
-    float G = 1.0 / (1.0 + lf_smith_lambda(yi, masked) + lf_smith_lambda(yo, masked));
-    return M2 * tilt * tilt * (0.25 * G) / (3.1415927 * width2 * (1.0 + v * (b + r * v)));
-}
-
-// The polynomial at s; an energy is never below 0.
-vec3 lf_amount2(Curve curve, float s) {
-    vec3 upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7));
-    return max(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0);
+    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
 
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 float lf_wider(float alpha, float coat_alpha) {
-    return pow(2.0 * pow(alpha, 1.412) + 0.5751 * pow(coat_alpha, 1.412), 0.7082153);
+    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
     float back = eta * eta * dot(i.w.xyz, o.w.xyz);
     return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+}
+
+// Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
+float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
+    float M = yi.w + yo.w;
+    float slope = h2 / M;
+    float projection_i = lf_ggx_projection(yi, width);
+    float projection_o = lf_ggx_projection(yo, width);
+    return slope * slope * (yi.w * yo.w) * lf_v_smith(yi.w, yo.w, projection_i, projection_o);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -385,7 +329,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 twice_ac = 2.0 * a * c;
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -404,55 +348,52 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float alpha = lf_coat.alpha + there * (lf_primer.alpha - lf_coat.alpha);
     float eta = lf_coat.eta * lf_primer.eta;
     vec3 kept = lf_amount(lf_coat_passed, crossing3.s) * lf_amount(lf_coat_passed, crossing4.s);
-    float part = lf_direct(lf_base_share(crossing3, crossing4, lf_base.alpha), 0.3296, 0.3522, 1.803);
-    vec4 y = lf_upwards(lf_lean(crossing3, crossing3, crossing4, lf_base.alpha), lf_primer.eta);
-    vec3 left = lf_absorbed(lf_between(y, crossing, part), part * crossing.theta, lf_coat.tau);
-    y = lf_upwards(lf_lean(crossing4, crossing3, crossing4, lf_base.alpha), lf_primer.eta);
-    left = left * lf_absorbed(lf_between(y, crossing2, part), part * crossing2.theta, lf_coat.tau);
-    kept = kept * left;
+    Shares shares = lf_split(crossing3, crossing4, lf_base.alpha);
+    float part = 0.2675 + 0.5116 * shares.base * shares.base;
+    vec4 y = lf_upwards(lf_lean(crossing3, crossing3, crossing4, shares.i), lf_primer.eta);
+    vec3 left = lf_coat.tau + (lf_between(y, crossing, part) - 1.0) * (2.0 * lf_coat.tau / (1.0 + lf_spread_root(part * crossing.theta, lf_coat.tau)));
+    y = lf_upwards(lf_lean(crossing4, crossing3, crossing4, shares.o), lf_primer.eta);
+    left = left + (lf_coat.tau + (lf_between(y, crossing2, part) - 1.0) * (2.0 * lf_coat.tau / (1.0 + lf_spread_root(part * crossing2.theta, lf_coat.tau))));
+    kept = kept * exp(-left);
     float throughput = crossing.T * crossing2.T / (lf_coat.eta * lf_coat.eta);
-    float share = lf_base_share(crossing, crossing2, lf_primer.alpha);
-    vec4 yi = lf_lean(crossing, crossing, crossing2, lf_primer.alpha);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, lf_primer.alpha);
-    part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    vec3 A = lf_absorbed(lf_between(yi, crossing, part), part * crossing.theta, lf_coat.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    float path = lf_between(yi, crossing, part);
-    vec3 U = lf_projected(path, part * crossing.theta, lf_coat.tau);
-    part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    A = A * lf_absorbed(lf_between(yo, crossing2, part), part * crossing2.theta, lf_coat.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    path = lf_between(yo, crossing2, part);
-    U = U * lf_projected(path, part * crossing2.theta, lf_coat.tau);
-    float F2 = lf_fresnel_dielectric(lf_half_cosine2(yi, yo), lf_primer.eta);
-    float rise = 1.0 + 0.3036 * lf_presence(lf_coat.eta) * lf_coat.alpha * lf_coat.alpha * share;
-    float lobes = rise * lf_lobe(crossing, crossing2, yi, yo, lf_primer.alpha, lf_primer.alpha);
-    vec3 again = 0.5 * F2 * (lf_amount2(lf_coat_inner_again, crossing.s) + lf_amount2(lf_coat_inner_again, crossing2.s));
-    vec3 lobes2 = lobes + again * lf_lobe(crossing, crossing2, yi, yo, lf_wider(lf_primer.alpha, lf_coat.alpha), lf_primer.alpha);
-    vec3 root = lf_amount2(lf_coat_inner_rest, crossing.s) * lf_amount2(lf_coat_inner_rest, crossing2.s);
+    shares = lf_split(crossing, crossing2, lf_primer.alpha);
+    part = 0.2675 + 0.5116 * shares.base * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float path_i = lf_between(yi, crossing, part);
+    float path_o = lf_between(yo, crossing2, part);
+    vec3 root_i = lf_spread_root(part * crossing.theta, lf_coat.tau);
+    vec3 root_o = lf_spread_root(part * crossing2.theta, lf_coat.tau);
+    vec3 U = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
+    vec3 throughput2 = throughput * exp(-(lf_coat.tau + (path_i - 1.0) * (2.0 * lf_coat.tau / (1.0 + root_i)) + (lf_coat.tau + (path_o - 1.0) * (2.0 * lf_coat.tau / (1.0 + root_o)))));
+    vec4 h = yi + yo;
+    float h2 = dot(h, h);
+    float F2 = lf_fresnel_dielectric(min(0.5 * sqrt(h2), 1.0), lf_primer.eta);
+    float rise = 1.0 + 0.468 * lf_presence(lf_coat.eta) * lf_coat.alpha * lf_coat.alpha * shares.base;
+    vec3 again = 0.5 * F2 * (lf_amount(lf_coat_inner_again, crossing.s) + lf_amount(lf_coat_inner_again, crossing2.s));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_primer.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_primer.alpha, lf_coat.alpha));
+    vec3 root = lf_amount(lf_coat_inner_rest, crossing.s) * lf_amount(lf_coat_inner_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_coat.eta, lf_primer.alpha);
-    float throughput2 = crossing3.T * crossing4.T / (eta * eta);
-    share = lf_base_share(crossing3, crossing4, lf_base.alpha);
-    yi = lf_lean(crossing3, crossing3, crossing4, lf_base.alpha);
-    yo = lf_lean(crossing4, crossing3, crossing4, lf_base.alpha);
-    part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    vec3 A2 = lf_absorbed(lf_between(yi, crossing3, part), part * crossing3.theta, lf_primer.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    path = lf_between(yi, crossing3, part);
-    vec3 U2 = lf_projected(path, part * crossing3.theta, lf_primer.tau);
-    part = lf_direct(share, 0.3296, 0.3522, 1.803);
-    A2 = A2 * lf_absorbed(lf_between(yo, crossing4, part), part * crossing4.theta, lf_primer.tau);
-    part = lf_direct(share, 0.3096, 0.2662, 1.772);
-    path = lf_between(yo, crossing4, part);
-    U2 = U2 * lf_projected(path, part * crossing4.theta, lf_primer.tau);
-    vec3 F3 = lf_fresnel_conductor(lf_half_cosine2(yi, yo), lf_base.eta, lf_base.k);
-    rise = 1.0 + 0.3036 * lf_presence(eta) * alpha * alpha * share;
-    lobes = rise * lf_lobe(crossing3, crossing4, yi, yo, lf_base.alpha, lf_base.alpha);
-    again = 0.5 * F3 * (lf_amount2(lf_coat_again, crossing3.s) + lf_amount2(lf_coat_again, crossing4.s));
-    vec3 lobes3 = lobes + again * lf_lobe(crossing3, crossing4, yi, yo, lf_wider(lf_base.alpha, alpha), lf_base.alpha);
-    root = lf_amount2(lf_coat_rest, crossing3.s) * lf_amount2(lf_coat_rest, crossing4.s);
+    throughput = crossing3.T * crossing4.T / (eta * eta);
+    shares = lf_split(crossing3, crossing4, lf_base.alpha);
+    part = 0.2675 + 0.5116 * shares.base * shares.base;
+    vec4 yi2 = lf_lean(crossing3, crossing3, crossing4, shares.i);
+    vec4 yo2 = lf_lean(crossing4, crossing3, crossing4, shares.o);
+    path_i = lf_between(yi2, crossing3, part);
+    path_o = lf_between(yo2, crossing4, part);
+    root_i = lf_spread_root(part * crossing3.theta, lf_primer.tau);
+    root_o = lf_spread_root(part * crossing4.theta, lf_primer.tau);
+    vec3 U2 = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
+    vec3 throughput3 = throughput * exp(-(lf_primer.tau + (path_i - 1.0) * (2.0 * lf_primer.tau / (1.0 + root_i)) + (lf_primer.tau + (path_o - 1.0) * (2.0 * lf_primer.tau / (1.0 + root_o)))));
+    h = yi2 + yo2;
+    float h22 = dot(h, h);
+    vec3 F3 = lf_fresnel_conductor(min(0.5 * sqrt(h22), 1.0), lf_base.eta, lf_base.k);
+    rise = 1.0 + 0.468 * lf_presence(eta) * alpha * alpha * shares.base;
+    again = 0.5 * F3 * (lf_amount(lf_coat_again, crossing3.s) + lf_amount(lf_coat_again, crossing4.s));
+    vec3 lobes2 = rise * lf_lobe(crossing3, crossing4, h.w, lf_base.alpha) + again * lf_lobe(crossing3, crossing4, h.w, lf_wider(lf_base.alpha, alpha));
+    root = lf_amount(lf_coat_rest, crossing3.s) * lf_amount(lf_coat_rest, crossing4.s);
     vec3 rest2 = root * root * lf_ahead(crossing3, crossing4, eta, lf_base.alpha);
-    vec3 value = F * D * V + (throughput * A * (F2 * U * lobes2 + rest) + kept * (throughput2 * A2 * (F3 * U2 * lobes3 + rest2)));
+    vec3 value = F * D * V + (throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_primer.alpha) * lobes) + rest) + kept * (throughput3 * (F3 * U2 * (lf_seen(yi2, yo2, h22, lf_base.alpha) * lobes2) + rest2)));
     return lit ? value : vec3(0.0);
 }
 

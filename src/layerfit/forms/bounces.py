@@ -14,19 +14,19 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._chunk import chunk, member, safe_divide, safe_power, safe_sqrt, struct, where
+from .._chunk import chunk, member, safe_divide, safe_sqrt, struct, where
 from .._types import Colour, Scalar
 from ..layers import Coat
 from ..optics.fresnel import fresnel_dielectric
 from ..optics.microfacet import ggx_lambda
 from ..surfaces.microfacet import Conductor
-from .curves import CELLS, Nodes, P, absorbed, diffuse_return, hemispherical, polynomial, presence
+from .curves import CELLS, Nodes, absorbed, added, diffuse_return, hemispherical, polynomial, presence
 
 RINGS, SPOKES = 8, 4
 """Facets that stand for all that light from one direction meets: Gauss over its cone, even over half a turn."""
 
-AGAIN = 0.5751
-"""Power of the coat's width that the lobe of light has which met the base twice: fitted to the random walk."""
+AGAIN = 0.9226
+"""Part of the coat's width that the lobe of light has which met the base twice: fitted to the random walk."""
 
 
 @struct
@@ -39,21 +39,18 @@ class Curve:
     c3: Colour = member("")
     c4: Colour = member("")
     c5: Colour = member("")
-    c6: Colour = member("")
-    c7: Colour = member("")
 
 
 @chunk
 def amount(curve: Curve, s: Scalar) -> Colour:
     """The polynomial at s; an energy is never below 0."""
-    upper = curve.c4 + s * (curve.c5 + s * (curve.c6 + s * curve.c7))
-    return jnp.maximum(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * upper))), 0.0)
+    return jnp.maximum(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5)))), 0.0)
 
 
 @chunk
 def wider(alpha: Scalar, coat_alpha: Scalar) -> Scalar:
     """Width of the lobe of light that met a base of width alpha twice, and the coat in between."""
-    return safe_power(2.0 * safe_power(alpha, P) + AGAIN * safe_power(coat_alpha, P), 1.0 / P)
+    return added(alpha, alpha, AGAIN * coat_alpha)
 
 
 def bounces(nodes: Nodes, alpha: Scalar, coat: Coat, base: Conductor | Coat) -> tuple[Curve, Curve]:
@@ -73,8 +70,8 @@ def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, t
     edge = safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta
     cells = cells_of(edge)
     aside = 0.5 * nodes.spread / nodes.z
-    first = _added(base.alpha, aside)
-    wide = _added(wider(base.alpha, alpha), aside)
+    first = added(base.alpha, aside)
+    wide = added(wider(base.alpha, alpha), aside)
     bare = jnp.broadcast_to(base.alpha, cells.shape)
     top = jnp.broadcast_to(jnp.maximum(alpha * presence(eta), 1e-3), cells.shape)
 
@@ -110,10 +107,6 @@ def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, t
     # Once more the root: over a smooth base the rest falls a hundredfold from grazing to normal light, too far for a polynomial.
     root = safe_sqrt(rest / jnp.sqrt(jnp.maximum(norm, 1e-12)))
     return Curve(*polynomial(weight)), Curve(*polynomial(root))
-
-
-def _added(alpha: Scalar, aside: Float[Array, " m"]) -> Float[Array, " m"]:
-    return safe_power(safe_power(alpha, P) + safe_power(aside, P), 1.0 / P)
 
 
 def cells_of(edge: Scalar) -> Float[Array, " k"]:

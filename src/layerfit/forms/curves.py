@@ -5,7 +5,8 @@ functions of one cosine, as polynomials. Both steps are smooth in index and widt
 """
 
 import dataclasses
-from functools import cache
+from functools import cache, reduce
+from operator import add
 from typing import Any
 
 import jax
@@ -14,20 +15,26 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from .._chunk import chunk, clip, member, safe_divide, safe_sqrt, struct, where
-from .._types import Colour, Scalar, Vec4
+from .._chunk import chunk, clip, member, safe_divide, safe_power, safe_sqrt, struct, where
+from .._types import Colour, Scalar, Vec3
 from ..optics.interface import facet_tilt, rough_transmittance, second_facet
 from . import tables
 from .tables import Kind
 
-DEGREE = 7
+DEGREE = 5
 """Of the baked polynomials: their error (rms 2e-3 of the values) is below that of the form."""
 
-SMOOTH_ETA = 1.15
-"""First index of the tables; below it, an interface tends to none at all."""
+BEND = 0.2
+"""Cosine about which the argument of the polynomials goes from following light to following 1 / NoW: in it they need the lowest degree."""
+
+MASKED = 0.005
+"""Step of the index above which facets hide one another as the tables say: a coat without a step is not there, and hides nothing."""
 
 CELLS = 6
 """Of cosines below, inside and outside of the edge of total reflection each."""
+
+TAUS = (0.25, 2.0)
+"""Optical depths at which the spread of paths in the tables is that of the walk."""
 
 GAUSS = 8
 """Nodes of the quadrature of diffuse light, inside and outside of the edge of total reflection each."""
@@ -35,29 +42,32 @@ GAUSS = 8
 STEER = 1.032
 """Share of the tables' turn of the mean direction."""
 
-P = 1.412
+P = 1.41
 """Widths add as powers."""
 
-WIDTH = 1.107
+WIDTH = 1.119
 """Width of a GGX lobe with the spread of the tables, over that spread."""
 
 
 @struct
 class Interface:
-    """The coat's rough top: functions of the cosine of light above it, each a polynomial in `grazing` with eight coefficients."""
+    """The coat's rough top: functions of the cosine of light above it, each a polynomial in `grazing` with six coefficients."""
 
     tilt: Scalar = member("turn of the mean facet towards a grazing direction")
     gain: Scalar = member("part of the reflected light that a second facet lets in")
-    passed: Vec4 = member("energy that passes, beyond the closed form: four coefficients")
-    passed_high: Vec4 = member("the other four, of higher powers")
-    bend: Vec4 = member("sine of the refracted light over that at a smooth interface")
-    bend_high: Vec4 = member("")
-    spread: Vec4 = member("width of a lobe seen through it")
-    spread_high: Vec4 = member("")
-    path: Vec4 = member("mean path over that of the refracted direction")
-    path_high: Vec4 = member("")
-    theta: Vec4 = member("scale of the path's distribution")
-    theta_high: Vec4 = member("")
+    passed: Vec3 = member("energy that passes, beyond the closed form: three coefficients")
+    passed_high: Vec3 = member("the other three, of higher powers")
+    bend: Vec3 = member("sine of the refracted light over that at a smooth interface, beyond 1")
+    bend_high: Vec3 = member("")
+    spread: Vec3 = member("width of a lobe seen through it, over that of the facets")
+    spread_high: Vec3 = member("")
+    path: Vec3 = member("mean path over that of the refracted direction")
+    path_high: Vec3 = member("")
+    theta: Vec3 = member("scale of the path's distribution")
+    theta_high: Vec3 = member("")
+
+    colourless = True
+    """Its vectors are coefficients, and no channels."""
 
 
 @struct
@@ -81,22 +91,43 @@ class Nodes:
 
 @chunk
 def grazing(NoW: Scalar) -> Scalar:
-    """Argument of the baked curves: sqrt(NoW) from the first node of the tables to 1, as -1 to 1."""
-    first = float(np.sqrt(tables.load("single").mu[0]))
-    return jnp.maximum(2.0 * (safe_sqrt(NoW) - first) / (1.0 - first) - 1.0, -1.0)
+    """Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1."""
+    a, b = _scale()
+    return jnp.maximum(a - b / (NoW + BEND), -1.0)
+
+
+@cache
+def _scale() -> tuple[float, float]:
+    """a and b such that a - b / (NoW + BEND) goes from -1 at the first node of the tables to 1 at the normal."""
+    b = 2.0 / (1.0 / (float(tables.load("single").mu[0]) + BEND) - 1.0 / (1.0 + BEND))
+    return 1.0 + b / (1.0 + BEND), b
 
 
 @chunk
-def curve(low: Vec4, high: Vec4, s: Scalar) -> Scalar:
-    """A polynomial of eight coefficients at s."""
-    upper = high[0] + s * (high[1] + s * (high[2] + s * high[3]))
-    return low[0] + s * (low[1] + s * (low[2] + s * (low[3] + s * upper)))
+def curve(low: Vec3, high: Vec3, s: Scalar) -> Scalar:
+    """A polynomial of six coefficients at s."""
+    return low[0] + s * (low[1] + s * (low[2] + s * (high[0] + s * (high[1] + s * high[2]))))
+
+
+def power(width: Any) -> Any:
+    """A width as the power in which widths add."""
+    return safe_power(width, P)
+
+
+def squared(powers: Any) -> Any:
+    """The square of a width, from the sum of such powers."""
+    return safe_power(powers, 2.0 / P)
+
+
+def added(*widths: Any) -> Any:
+    """What several widths make together."""
+    return safe_power(reduce(add, map(power, widths)), 1.0 / P)
 
 
 @chunk
 def presence(eta: Scalar) -> Scalar:
-    """0 where the indices match and there is no interface, 1 from the first index of the tables on."""
-    t = clip((eta - 1.0) / (SMOOTH_ETA - 1.0), 0.0, 1.0)
+    """0 where the indices match and there is no interface, 1 from 1.15 on."""
+    t = clip((eta - 1.0) / 0.15, 0.0, 1.0)
     return t * (2.0 - t)
 
 
@@ -114,34 +145,41 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     dtype = eta.dtype
     at = jnp.einsum("e,a,eaq->q", _cubic(eta, baked.eta), _cubic(alpha, baked.alpha), jnp.asarray(baked.values, dtype))
     count = len(baked.mu)
-    dT, rx, w, m, theta = at[: 5 * count].reshape(5, count)
-    there = presence(eta)
-    R = there * at[5 * count :]
+    dT, rx, w, path, theta = at[: 5 * count].reshape(5, count)
+    R = at[5 * count :]
     mu = jnp.asarray(baked.mu, dtype)
     sin2 = (1.0 - mu) * (1.0 + mu)
-    bend = 1.0 + STEER * there * (rx - 1.0)
-    sine = jnp.minimum(jnp.sqrt(sin2) * bend / eta, 0.9998)
-    z = jnp.sqrt((1.0 - sine) * (1.0 + sine))
-    spread = WIDTH * there * w
-    rows = (there * dT, bend, spread, 1.0 + there * (m * z - 1.0), theta)
+    bend = STEER * (rx - 1.0)
+    z = _below(mu, sin2, (1.0 + bend) / eta)
+    spread = WIDTH * w
+    # The path of the tables is that of their own direction.
+    longer = path * z / _below(mu, sin2, rx / eta)
+    hidden = dT * clip((eta - 1.0) / MASKED, 0.0, 1.0)
+    rows = (hidden, bend, spread, longer, theta)
     curves = [half for row in rows for half in jnp.split(polynomial(row), 2)]
     rough = where(alpha > 1.0, 1.0, alpha)  # not min: at 1 its derivative is half of either side's
     tilt, gain = facet_tilt(rough), second_facet(rough)
     closed = jax.vmap(lambda c: rough_transmittance(c, eta, gain))(jnp.sqrt(mu * mu + tilt * sin2))
-    T = clip(closed + rows[0], 0.0, 1.0)
+    T = clip(closed + hidden, 0.0, 1.0)
     cosines, widths = gauss(safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta)
     weights = 2.0 * (jnp.asarray(baked.quadrature, dtype) @ R) * cosines * widths
     nodes = Nodes(
         z,
         T,
         spread * alpha,
-        jnp.maximum(rows[3], 1.0) / z,
-        jnp.maximum(theta, 1e-4),
+        jnp.maximum(longer, 1.0) / z,
+        jnp.maximum(theta, 0.0),
         jnp.asarray(baked.cells, dtype) @ R,
         cosines,
         weights,
     )
     return Interface(tilt, gain, *curves), nodes
+
+
+def _below(mu: Any, sin2: Any, bend: Any, xp: Any = jnp) -> Any:
+    """Cosine below of light whose sine changes by `bend`; what a denser medium refracts does not graze more than before."""
+    bend = xp.minimum(bend, 1.0)
+    return xp.sqrt(mu * mu + (1.0 - bend) * (1.0 + bend) * sin2)
 
 
 def diffuse_return(nodes: Nodes, tau: Colour | None) -> Colour:
@@ -172,10 +210,31 @@ def polynomial(values: Float[Array, " m"]) -> Float[Array, " c"]:
 
 
 @chunk
+def spread_root(theta: Scalar, tau: Colour) -> Colour:
+    """How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957)."""
+    return jnp.sqrt(1.0 + 2.0 * theta * tau)
+
+
+def depth(path: Scalar, root: Colour, tau: Colour) -> Colour:
+    """-log of the mean of exp(-tau u) over paths u; root is their `spread_root`."""
+    return tau + (path - 1.0) * (2.0 * tau / (1.0 + root))
+
+
 def absorbed(path: Scalar, theta: Scalar, tau: Colour) -> Colour:
-    """Mean of exp(-tau u) over paths u = 1 + Gamma of mean `path` and scale theta."""
-    scale = jnp.maximum(theta, 1e-6)
-    return jnp.exp(-(tau + jnp.maximum(path - 1.0, 1e-9) * (jnp.log1p(scale * tau) / scale)))
+    """Mean of exp(-tau u) over paths u beyond 1 of mean `path` and scale theta."""
+    return jnp.exp(-depth(path, spread_root(theta, tau), tau))
+
+
+def inverse_gaussian(kt: Any, theta: Any) -> tuple[Any, Any]:
+    """Mean beyond 1 and scale of paths, from those of the tables' Gamma distribution.
+
+    Both have the same mean of exp(-tau u) at the two depths of the tables. Elsewhere this one is nearer to the walk, and needs no logarithm.
+    """
+    thin, thick = (kt / theta * np.log1p(theta * tau) for tau in TAUS)
+    # With s = sqrt(1 + 2 theta tau), thin / thick = (1 + s_thick) / (8 (1 + s_thin)) and s_thick^2 - 1 = 8 (s_thin^2 - 1).
+    ratio = np.clip(8.0 * thin / np.maximum(thick, 1e-30), 1.0, 2.7)
+    root = (8.0 + ratio * (ratio - 2.0)) / (8.0 - ratio * ratio)
+    return 0.5 * (1.0 + root) * thin / TAUS[0], 0.5 * (root * root - 1.0) / TAUS[0]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -196,17 +255,23 @@ class _Baking:
 @cache
 def _baking(kind: Kind) -> _Baking:
     t = tables.load(kind)
-    edge = np.sqrt(1.0 - 1.0 / t.eta[0].astype(float) ** 2)
-    below = t.mu_below[0].astype(float)
+    eta, mu = t.eta.astype(float), t.mu.astype(float)
+    edge = np.sqrt(1.0 - 1.0 / eta[-1] ** 2)
+    below = t.mu_below[-1].astype(float)
     part = np.where(below < edge, below / edge, 1.0 + (below - edge) / (1.0 - edge)) - 1.0
-    columns = (t.dT, t.rx, t.w, 1.0 + t.kt, np.exp(t.lt), t.Rb)
+    mean, theta = inverse_gaussian(t.kt.astype(float), np.exp(t.lt.astype(float)))
+    z = _below(mu, 1.0 - mu * mu, t.rx / eta[:, None, None], np)
+    # Where the indices match light goes straight on.
+    nothing = np.zeros_like(t.dT[:1])
+    first = (t.dT[:1], nothing + 1.0, nothing, nothing + 1.0, nothing, np.zeros_like(t.Rb[:1]))
+    columns = [np.concatenate(pair) for pair in zip(first, (t.dT, t.rx, t.w, (1.0 + mean) * z, theta, t.Rb), strict=True)]
     x, _ = _gauss()
     at = lambda parts: np.stack([_cubic(p, part, np) for p in parts])  # noqa: E731
     quadrature, cells = at(np.concatenate([x - 1.0, x])), at(np.arange(2 * CELLS + 1) / CELLS - 1.0)
     return _Baking(
-        eta=t.eta.astype(float),
+        eta=np.concatenate([[1.0], eta]),
         alpha=t.alpha.astype(float),
-        mu=t.mu.astype(float),
+        mu=mu,
         values=np.concatenate(columns, -1).astype(float),
         quadrature=quadrature,
         cells=cells,
@@ -217,10 +282,8 @@ def _baking(kind: Kind) -> _Baking:
 def _above() -> tuple[np.ndarray, np.ndarray]:
     """For values at the cosines of the tables above: coefficients of the polynomial, and 2 int f mu dmu of it."""
     mu = tables.load("single").mu.astype(float)
-    first = np.sqrt(mu[0])
-    powers = lambda mu: np.polynomial.polynomial.polyvander(  # noqa: E731
-        np.maximum(2.0 * (np.sqrt(mu) - first) / (1.0 - first) - 1.0, -1.0), DEGREE
-    )
+    a, b = _scale()
+    powers = lambda mu: np.polynomial.polynomial.polyvander(np.maximum(a - b / (mu + BEND), -1.0), DEGREE)  # noqa: E731
     fit = np.linalg.pinv(powers(mu))
     x, dx = np.polynomial.legendre.leggauss(40)
     x = 0.5 * (x + 1.0)

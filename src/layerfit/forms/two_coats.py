@@ -15,14 +15,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._chunk import chunk, clip, dot, safe_divide, safe_power, safe_sqrt, struct, where
+from .._chunk import chunk, clip, dot, safe_divide, safe_sqrt, struct, where
 from .._types import Colour, Direction, Scalar
 from ..layers import Coat
 from ..optics.directions import along, direction
 from . import one_coat, tables
 from .bounces import Curve, amount, bounces, cells_of
-from .curves import Interface, Nodes, P, absorbed, bake, diffuse_return, gauss, polynomial, presence
-from .one_coat import DIRECT, Crossing, base_share, between, direct, lean, pass_interface
+from .curves import Interface, Nodes, absorbed, added, bake, depth, diffuse_return, gauss, polynomial, presence, spread_root
+from .one_coat import Crossing, between, direct, lean, pass_interface, split
 from .tables import Kind
 
 HELD = ("top", "both", "passed", "inner_again", "inner_rest", "returned", "again", "rest")
@@ -136,12 +136,13 @@ def absorbed_above(i1: Crossing, o1: Crossing, i: Crossing, o: Crossing, prepare
     (outer, inner), base = prepared.coats, prepared.base
     if not base.lobes:
         return absorbed(i1.path, i1.theta, outer.tau) * absorbed(o1.path, o1.theta, outer.tau)
-    part = direct(base_share(i, o, base.alpha), *DIRECT)
-    left: Any = 1.0
-    for x, x1 in ((i, i1), (o, o1)):
-        y = upwards(lean(x, i, o, base.alpha), inner.eta)
-        left = left * absorbed(between(y, x1, part), part * x1.theta, outer.tau)
-    return left
+    shares = split(i, o, base.alpha)
+    part = direct(shares.base)
+    left: Any = 0.0
+    for x, x1, share in ((i, i1, shares.i), (o, o1, shares.o)):
+        y = upwards(lean(x, i, o, share), inner.eta)
+        left = left + depth(between(y, x1, part), spread_root(part * x1.theta, outer.tau), outer.tau)
+    return jnp.exp(-left)
 
 
 @chunk
@@ -191,9 +192,9 @@ def _after(a: Crossing, b: Crossing, eta: Scalar) -> Crossing:
     before = (a.path - 1.0 / a.w[-1]) * k
     own = jnp.maximum(b.path - 1.0 / b.w[-1], 0.0)
     theta = (own * b.theta + before * a.theta * k) / jnp.maximum(own + before, 1e-6)
-    spread = safe_power(safe_power(a.a / eta, P) + safe_power(b.a, P), 1.0 / P)
+    spread = added(a.a / eta, b.a)
     path = 1.0 / b.w[-1] + held(own + before)
-    return Crossing(b.w, a.T, spread, path, jnp.maximum(held(theta), 1e-4), a.s)
+    return Crossing(b.w, a.T, spread, path, held(theta), a.s)
 
 
 def held(x: Scalar) -> Scalar:
@@ -204,7 +205,7 @@ def held(x: Scalar) -> Scalar:
 def _composed(first: _Top, way: tuple[Any, Crossing, Crossing, Crossing]) -> Interface:
     """Curves of the whole way, to be read like those of one top: for the outer coat's index and a width of 1."""
     w, _, _, x = way
-    bend = x.w[:, 0] / w[:, 0] * first.eta
+    bend = x.w[:, 0] / w[:, 0] * first.eta - 1.0
     rows = {"bend": bend, "spread": x.a, "path": x.path * x.w[:, 2], "theta": x.theta}
     halves: dict[str, Any] = {}
     for name, row in rows.items():

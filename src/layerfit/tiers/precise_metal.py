@@ -11,15 +11,12 @@ from .._chunk import chunk, member, static, struct
 from .._types import Colour, Scalar, Vec2
 from ..forms import one_coat
 from ..forms.bounces import amount, wider
-from ..forms.curves import P, curve, grazing, presence
+from ..forms.curves import curve, grazing, power, presence, spread_root, squared
 from ..layers import Coat
 from ..optics.interface import rough_transmittance
 from .polynomial import Curve, Polynomial
 from .surface import Compact, Recipe, colour_of, cosines
 from .top import coat_lobe, hidden_cosine
-
-LEAST_Z2 = 4e-4
-"""A direction below never leans further than 1 - 0.9998^2."""
 
 
 @struct
@@ -33,11 +30,11 @@ class PreciseWay:
     bend: Scalar = member("sine below over that above")
     z2: Scalar = member("squared cosine below")
     z: Scalar = member("cosine below")
-    width: Scalar = member("spread as a width, to the power in which widths add")
+    spread: Scalar = member("spread as a width, to the power in which widths add")
     tail: Scalar = member("its square, times its part in a lobe's tail")
     path: Scalar = member("mean path, in thicknesses")
     theta: Scalar = member("scale of the path's distribution")
-    rest: Colour = member("square root of what leaves of the light that goes to and fro")
+    rest: Colour = member("fourth root of what leaves of the light that goes to and fro")
     again: Colour = member("half the weight of the lobe of light that met the metal twice")
 
 
@@ -51,27 +48,27 @@ class PreciseMetal(Compact):
     passed: Polynomial
     """Of the cosine of the mean facet: energy over the index, by the closed form."""
     bent: Polynomial
-    """Of `grazing`: bend, width, path times the cosine below, and theta."""
+    """Of `grazing`: bend, spread, path times the cosine below, and theta."""
     rest: Polynomial
-    """Of `grazing`: square root of the light that is left, and what the energy is beyond the closed form."""
+    """Of `grazing`: fourth root of the light that is left, and what the energy is beyond the closed form."""
     again: Polynomial
     """Of `grazing`: half the weight of the second lobe, and the spread of the tail."""
-    own: Polynomial
-    """Of the sum of the cosines below: width of the metal, to the power in which widths add."""
-    part: Polynomial
-    """Of the metal's share in the width of its lobe: parts of the path's spread that count for absorption and for the projected area."""
     absorbing: Polynomial | None
     """Of theta: optical depth that counts."""
+    unspread: Polynomial | None
+    """Of theta: one over `spread_root`."""
     reflectance: Polynomial
     """Of four times the squared half cosine below."""
-    widths: Polynomial
-    """Of the sum of the cosines below: widths of both lobes, to the power in which they add."""
+    own: Polynomial
+    """Of the sum of the cosines below: it to the power in which widths add."""
     variance: Polynomial
-    """Of those and the spreads together: squared widths."""
-    peak: Polynomial
-    """Of a lobe's ratio to GGX: the middle coefficient of its shape."""
+    """Of the widths that a lobe is made of, to that power, together: its squared width."""
+    widths: Vec2
+    """Width of the metal's facets, and of those that stand for two meetings, to that power."""
     alpha2: Vec2
-    """Squared widths of the metal's facets, and of those that stand for two meetings."""
+    """Their squares."""
+    least: Scalar
+    """Squared cosine below which no light is turned."""
     rise: Scalar
     """Growth of the first lobe."""
     ahead: Scalar
@@ -83,24 +80,25 @@ class PreciseMetal(Compact):
         return precise_way(self.passed, self.bent, self.rest, self.again, self.coat, self.tilt, NoW)
 
     def meet(self, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> Colour:
-        between = metal_between(self.own, i, o, lean2)
-        lobes = metal_lobes(self.widths, self.variance, self.peak, self.alpha2, i, o, between)
+        between = metal_between(self.own, self.widths, self.least, i, o, lean2)
+        lobes = metal_lobes(self.own, self.variance, self.widths, self.alpha2, i, o, between)
         F = self.reflectance(between.h2)
         again = F * (i.again + o.again) * lobes[1]
         rise = 1.0 + self.rise * between.share
         back = i.bend * o.bend * (lean2 - i.sin2 - o.sin2)
-        rest = i.rest * o.rest * jnp.maximum(1.0 / math.pi - self.ahead * back, 0.0)
-        parts = self.part(between.share)
-        inverse_i, inverse_o = between.inverse_i, between.inverse_o
-        path_i = (inverse_i - 1.0) + parts * (i.path - inverse_i)
-        path_o = (inverse_o - 1.0) + parts * (o.path - inverse_o)
+        root = i.rest * o.rest
+        rest = root * root * jnp.maximum(1.0 / math.pi - self.ahead * back, 0.0)
+        part = one_coat.direct(between.share)
+        path_i = (between.inverse_i - 1.0) + part * (i.path - between.inverse_i)
+        path_o = (between.inverse_o - 1.0) + part * (o.path - between.inverse_o)
         throughput: Any = i.T * o.T
-        if self.absorbing is None:
-            U: Any = (1.0 + path_i[1]) * (1.0 + path_o[1])
+        if self.absorbing is None or self.unspread is None:
+            U: Any = (1.0 + path_i) * (1.0 + path_o)
         else:
-            depth = path_i[0] * self.absorbing(parts[0] * i.theta) + path_o[0] * self.absorbing(parts[0] * o.theta)
+            theta_i, theta_o = part * i.theta, part * o.theta
+            depth = path_i * self.absorbing(theta_i) + path_o * self.absorbing(theta_o)
             throughput = throughput * jnp.exp(-(2.0 * self.coat.tau + depth))
-            U = projected_area(path_i[1], path_o[1], parts[1] * i.theta, parts[1] * o.theta, self.coat.tau)
+            U = (1.0 + path_i * self.unspread(theta_i)) * (1.0 + path_o * self.unspread(theta_o))
         top = coat_lobe(self.coat, i.NoW, o.NoW, i.hidden, o.hidden, lean2)
         return top + throughput * (F * U * (rise * lobes[0] + again) + rest)
 
@@ -132,7 +130,7 @@ def precise_way(
     second = again(s)
     T = passed(jnp.sqrt(tilt + (1.0 - tilt) * NoW2)) + left[-1]
     bend = crossing[0]
-    z2 = 1.0 - bend * bend * sin2
+    z2 = NoW2 + (1.0 - bend * bend) * sin2
     inverse = jax.lax.rsqrt(z2)
     hidden = hidden_cosine(NoW, coat.alpha * coat.alpha)
     path = crossing[2] * inverse
@@ -154,49 +152,37 @@ def precise_way(
 
 
 @chunk
-def metal_between(own: Polynomial, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> MetalBetween:
+def metal_between(own: Polynomial, widths: Vec2, least: Scalar, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> MetalBetween:
     """Turn two directions towards the mirror direction, each by the share of its spread in the width of the lobe."""
     bends = i.bend - o.bend
     x2 = jnp.maximum(i.bend * o.bend * lean2 + bends * (i.bend * i.sin2 - o.bend * o.sin2), 0.0)
-    base = own(i.z + o.z)
-    inverse = 1.0 / (base + i.width + o.width)
+    base = widths[0] * own(i.z + o.z)
+    inverse = 1.0 / (base + i.spread + o.spread)
     turns = one_coat.CONDENSE * inverse
-    turn_i, turn_o = turns * i.width, turns * o.width
+    turn_i, turn_o = turns * i.spread, turns * o.spread
     apart = o.z2 - i.z2
-    z2_i = jnp.maximum(i.z2 + turn_i * (apart + (1.0 - turn_i) * x2), LEAST_Z2)
-    z2_o = jnp.maximum(o.z2 + turn_o * ((1.0 - turn_o) * x2 - apart), LEAST_Z2)
+    z2_i = jnp.maximum(i.z2 + turn_i * (apart + (1.0 - turn_i) * x2), least)
+    z2_o = jnp.maximum(o.z2 + turn_o * ((1.0 - turn_o) * x2 - apart), least)
     inverse_i, inverse_o = jax.lax.rsqrt(z2_i), jax.lax.rsqrt(z2_o)
     z_i, z_o = z2_i * inverse_i, z2_o * inverse_o
     kept = 1.0 - turn_i - turn_o
     M = z_i + z_o
-    return MetalBetween(x2, base * inverse, M, M * M + kept * kept * x2, z_i, z_o, inverse_i, inverse_o)
+    h2 = M * M + kept * kept * x2
+    return MetalBetween(x2, base * inverse, M, h2, z_i, z_o, inverse_i, inverse_o)
 
 
 @chunk
 def metal_lobes(
-    widths: Polynomial,
-    variance: Polynomial,
-    peak: Polynomial,
-    alpha2: Vec2,
-    i: PreciseWay,
-    o: PreciseWay,
-    between: MetalBetween,
+    own: Polynomial, variance: Polynomial, widths: Vec2, alpha2: Vec2, i: PreciseWay, o: PreciseWay, between: MetalBetween
 ) -> Vec2:
     """D G / 4 of light that met the metal once, and of light that met it twice: two lobes at once."""
-    M2 = between.M * between.M
-    size = variance(widths(between.M) + (i.width + o.width))
-    r = (1.0 - one_coat.RATIO) + one_coat.RATIO * size / (alpha2 * M2 + (i.tail + o.tail))
-    shapes = size / (size * size + between.x2 * (peak(r) * size + r * between.x2))
+    size = variance(widths * own(between.M) + (i.spread + o.spread))
+    x = one_coat.RATIO * (size / (alpha2 * (between.M * between.M) + (i.tail + o.tail))) - one_coat.RATIO
+    shapes = size / (size * size + between.x2 * (one_coat.middle(x) * size + (1.0 + x) * between.x2))
     hidden_i, hidden_o = hidden_cosine(between.z_i, alpha2[0]), hidden_cosine(between.z_o, alpha2[0])
-    G = between.z_i * between.z_o / (M2 * (between.z_o * hidden_i + between.z_i * hidden_o))
-    return ((0.5 / math.pi) * between.h2 * between.h2 * G) * shapes
-
-
-@chunk
-def projected_area(path_i: Scalar, path_o: Scalar, theta_i: Scalar, theta_o: Scalar, tau: Colour) -> Colour:
-    """Mean of u among the paths that are left, of both directions: 1 + path / (1 + theta tau), path the mean beyond 1."""
-    spread_i, spread_o = 1.0 + theta_i * tau, 1.0 + theta_o * tau
-    return (spread_i + path_i) * (spread_o + path_o) / (spread_i * spread_o)
+    slope = between.h2 / between.M
+    seen = between.z_i * between.z_o / (between.z_o * hidden_i + between.z_i * hidden_o)
+    return ((0.5 / math.pi) * (slope * slope) * seen) * shapes
 
 
 def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
@@ -211,14 +197,13 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
     def follow(NoW: Any) -> Any:
         crossing = one_coat.pass_interface(interface, eta, coat.alpha, jnp.stack([jnp.sqrt(1.0 - NoW * NoW), 0.0 * NoW, NoW]))
         s, z = crossing.s, crossing.w[2]
-        bend = curve(interface.bend, interface.bend_high, s) / eta
-        root = amount(rest, s)
+        bend = (1.0 + curve(interface.bend, interface.bend_high, s)) / eta
         beyond = curve(interface.passed, interface.passed_high, s) / eta
         return (
             s,
             z,
-            jnp.stack([bend, crossing.a**P, crossing.path * z, crossing.theta]),
-            jnp.hstack([root * root, beyond]),
+            jnp.stack([jnp.minimum(bend, 1.0), power(crossing.a), crossing.path * z, crossing.theta]),
+            jnp.hstack([amount(rest, s), beyond]),
             jnp.hstack([0.5 * amount(again, s), one_coat.TAIL * crossing.a * crossing.a]),
         )
 
@@ -226,39 +211,46 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
     s, z, bent, left, second = (np.asarray(a) for a in jax.vmap(follow)(jnp.asarray(NoW)))
     facet = np.sqrt(tilt + (1.0 - tilt) * NoW**2)
     closed = np.asarray(jax.vmap(lambda c: rough_transmittance(c, eta, interface.gain))(jnp.asarray(facet))) / eta
-    alphas = np.array([float(base.width), float(wider(base.width, coat.width))])
-    M = np.linspace(1.96 * z.min(), 2.0, len(NoW))
-    widths = (alphas * M[:, None]) ** P
-    spread = 2.0 * bent[:, 1].min(), 2.0 * bent[:, 1].max()
-    least, most = 1.0 / (1.0 + spread[1] / widths[0, 0]), 1.0 / (1.0 + spread[0] / widths[-1, 0])
-    share = np.linspace(least, most, len(NoW))
-    parts = np.stack([np.clip(d + c * share**e, 0.0, 1.5) for d, c, e in (one_coat.DIRECT, one_coat.DIRECT_PATH)], -1)
-    theta = np.linspace(1e-6, bent[:, 3].max() * parts.max(), len(NoW))[:, None]
-    total = np.linspace(widths[0].min() + spread[0], widths[-1].max() + spread[1], len(NoW))
-    ratio = np.linspace(0.6, 1.0 + one_coat.RATIO * 1.0, len(NoW))
-    log_r = np.log(ratio)
+    theta = np.linspace(0.0, bent[:, 3].max() * sum(one_coat.DIRECT), len(NoW))
     cosine = np.linspace(0.98 * z.min(), 1.0, len(NoW))
     F = np.asarray(jax.vmap(base.reflectance)(jnp.asarray(cosine)))
-    tau = None if coat.tau is None else np.asarray(coat.tau)
+    alphas = jnp.stack([base.width, wider(base.width, coat.width)])
+    widths = power(alphas)
+    M = np.linspace(1.96 * z.min(), 2.0, len(NoW))
+    raised, spread = np.asarray(power(jnp.asarray(M))), bent[:, 1]
+    total = np.linspace(widths[0] * raised[0] + 2.0 * spread.min(), widths[1] * raised[-1] + 2.0 * spread.max(), len(NoW))
+    size = np.asarray(squared(jnp.asarray(total)))
     curves = {
         "passed": Curve(facet, closed, 1.0 / closed),
         "bent": Curve(s, bent, np.broadcast_to(1.0 / bent.max(0), bent.shape)),
         "rest": Curve(s, left),
         "again": Curve(s, second),
-        "own": Curve(M, widths[:, 0], 1.0 / widths[:, 0], 4),
-        "part": Curve(share, parts, 1.0, 5),
-        "absorbing": None if tau is None else Curve(theta[:, 0], np.squeeze(np.log1p(theta * tau) / theta), 1.0, 5),
+        "own": Curve(M, raised, 1.0 / raised, 4),
+        "variance": Curve(total, size, 1.0 / size, 5),
         "reflectance": Curve(4.0 * cosine**2, F, 1.0 / F, 6),
-        "widths": Curve(M, widths, 1.0 / widths, 4),
-        "variance": Curve(total, total ** (2.0 / P), total ** (-2.0 / P), 5),
-        "peak": Curve(ratio, 2.0 - log_r * (1.993 + log_r * (0.197 + 0.051 * log_r)), 1.0, 4),
     }
+    if coat.tau is not None:
+        root = np.squeeze(np.asarray(spread_root(theta[:, None], jnp.asarray(coat.tau))))
+        curves |= {
+            "absorbing": Curve(theta, np.squeeze(2.0 * np.asarray(coat.tau) / (1.0 + root)), 1.0, 5),
+            "unspread": Curve(theta, 1.0 / root, 1.0, 5),
+        }
+    least = jnp.asarray(min(one_coat.LEAST_Z2, z.min() ** 2))
     rise = one_coat.RISE * presence(eta) * coat.alpha * coat.alpha
     ahead = 0.5 / math.pi * eta * eta * (1.0 - jnp.minimum(base.width, 1.0))
 
     def build(p: Any) -> PreciseMetal:
+        absorption = {"absorbing": None, "unspread": None}
         return PreciseMetal(
-            coat=coat, tilt=tilt, alpha2=jnp.asarray(alphas**2), rise=rise, ahead=ahead, name=name, **({"absorbing": None} | p)
+            coat=coat,
+            tilt=tilt,
+            widths=widths,
+            alpha2=alphas * alphas,
+            least=least,
+            rise=rise,
+            ahead=ahead,
+            name=name,
+            **(absorption | p),
         )
 
-    return Recipe({key: c for key, c in curves.items() if c is not None}, build)
+    return Recipe(curves, build)
