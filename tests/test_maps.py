@@ -174,7 +174,7 @@ def test_what_is_interrupted_goes_on(panel, found, tmp_path, monkeypatch):
 
     with pytest.raises(KeyboardInterrupt):
         fit_map(panel / "scene.toml", tmp_path / "out", progress=stop)
-    assert len(list((tmp_path / "out" / ".tiles").glob("*.npz"))) == 1
+    assert len(list((tmp_path / "out" / ".tiles").glob("*.tile"))) == 1
     assert not (tmp_path / "out" / "map.json").exists()
     counted = []
     monkeypatch.setattr("layerfit.maps.descent.Descent.solve", _counting(counted))
