@@ -15,7 +15,7 @@ from .engine import Engine
 SCHEMA = "layerfit/principled"
 
 SCRIPT = '''\
-"""{name}: a material for Blender 4 and 5, written by layerfit. Run it in Blender's text editor, or
+"""{name}: a material for Blender {versions}, written by layerfit. Run it in Blender's text editor, or
 
     blender scene.blend --background --python {name}.py
 
@@ -47,7 +47,8 @@ if active is not None and hasattr(active.data, "materials"):
 def write(found: Conversion) -> str:
     """A script that makes the material."""
     inputs = json.dumps(principled(found.engine), indent=4)
-    return SCRIPT.format(name=found.name, quoted=json.dumps(found.name), inputs=inputs)
+    versions = "4 and 5" if found.engine.film_nm is None else "5, whose metals have films"
+    return SCRIPT.format(name=found.name, versions=versions, quoted=json.dumps(found.name), inputs=inputs)
 
 
 def principled(engine: Engine) -> dict[str, Any]:

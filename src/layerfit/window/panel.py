@@ -90,12 +90,12 @@ class Panel:
         """The next bar, or the one before it; it comes in sight."""
         self.chosen = (self.chosen + by) % len(self.bars)
         y = next(y for y, bar in self._rows() if bar is self.bars[self.chosen])
-        room = self._room(height)
+        room = self.room(height)
         self.scrolled = max(min(self.scrolled, y - HEAD), y + ROW - room, 0)
 
     def scroll(self, by: int, height: int) -> None:
         """Down by so many pixels, as far as there is more."""
-        self.scrolled = min(max(self.scrolled + by, 0), max(self._length - self._room(height), 0))
+        self.scrolled = min(max(self.scrolled + by, 0), max(self._length - self.room(height), 0))
 
     def at(self, y: int) -> int | None:
         """Number of the bar at a height from the top."""
@@ -127,7 +127,7 @@ class Panel:
         return max(y for y, _ in self._rows()) + ROW + GAP
 
     @staticmethod
-    def _room(height: int) -> int:
+    def room(height: int) -> int:
         """What the lines of help leave to the bars."""
         return height - (len(HELP) + 1) * ROW - GAP
 
@@ -137,10 +137,10 @@ class Panel:
         page = _Page(ImageDraw.Draw(picture), scale)
         for k, (top, bar) in enumerate(self._rows()):
             self._draw(page, top - self.scrolled, bar, k)
-        page.box((0, self._room(height), WIDTH, height), PAPER)
-        page.box((GAP, self._room(height), WIDTH - GAP, self._room(height)), LINE)
+        page.box((0, self.room(height), WIDTH, height), PAPER)
+        page.box((GAP, self.room(height), WIDTH - GAP, self.room(height)), LINE)
         for k, line in enumerate((*HELP, self.said)):
-            page.text((GAP, self._room(height) + 6 + k * ROW), line, ACCENT if k == len(HELP) else SOFT)
+            page.text((GAP, self.room(height) + 6 + k * ROW), line, ACCENT if k == len(HELP) else SOFT)
         return picture
 
     def _draw(self, page: "_Page", y: int, bar: Bar, k: int) -> None:

@@ -103,7 +103,7 @@ class Screen:
         width, _ = self.room
         if x < width:
             self.held = "light" if math.dist((x, y), self.sun_at()) < 1.5 * SUN else "view"
-        elif (bar := self.panel.at(y)) is not None:
+        elif y < self.panel.room(self.window.height) and (bar := self.panel.at(y)) is not None:
             self.held, self.panel.chosen = "bar", bar
             self.dragged(x, y, 0, 0)
 
