@@ -31,6 +31,7 @@ LOSS = {
     ("lacquered_copper", "three"): 2.54,
     ("lacquered_copper", "babylon"): 2.63,
     ("clear_coated_red_paint", "three"): 1.92,
+    ("clear_coated_red_paint", "babylon"): 1.91,
     ("anodised_titanium", "three"): 1.64,
     ("anodised_titanium", "babylon"): 1.49,
     ("brushed_steel", "three"): 0.22,
