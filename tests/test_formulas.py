@@ -101,6 +101,7 @@ TILT = Kind(2, lambda p: 6.0 * p - 3.0)  # three times the widest spread
 UV = Kind(2, lambda p: 200.0 * p - 100.0)
 WORDS = Kind(3, lambda p: np.floor(p * 0xFFFFFFFF).astype(np.uint32))
 SEED = whole(16777215)
+BITS = whole(0xFFFFFFFF)
 
 
 def facets(kind: Any) -> dict[str, Any]:
@@ -128,8 +129,9 @@ DOMAINS: dict[Any, dict[str, Any]] = {
     },
     flakes: {
         "flake_tilt": (flakes.flake_tilt, (UV, field(Flakes, "per_uv"), field(Flakes, "sigma"), SEED), (-6.0, 6.0)),
-        "exponential": (lambda u: flakes.exponential(u, 1.0 - u), (number(2.0**-25, 1.0 - 2.0**-24),), (0.0, 17.5)),
-        "circle": (flakes.circle, (UNIT,), (-1.0, 1.0)),
+        "exponential": (flakes.exponential, (BITS, UNIT), (0.0, 17.5)),
+        "circle": (flakes.circle, (BITS, UNIT), (-1.0, 1.0)),
+        "odd_number": (lambda bits: flakes.odd_number(bits).astype(float), (BITS,), (1.0, 2.0**flakes.ODD)),
         "tilted_normal": (flakes.tilted_normal, (TILT,), (-1.0, 1.0)),
         "tilted_d": (flakes.tilted_d, (W, TILT, ALPHA), POSITIVE),
         "kept_tilt": (flakes.kept_tilt, (number(0.0, 1e6, "softlog"), field(Flakes, "half_distance")), FULL),
