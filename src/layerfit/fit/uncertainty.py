@@ -126,8 +126,15 @@ def spread(sums: Sums) -> Uncertainty:
     for gradient in sums.alike:
         step = newton(gram, gradient)
         covariance += np.outer(step, step)
-    covariance += AGREEMENT**2 * np.eye(n)
-    return Uncertainty(covariance, blind, -newton(gram, np.sum(sums.part_gradients, 0)))
+    return Uncertainty(_not_below(AGREEMENT, covariance), blind, -newton(gram, np.sum(sums.part_gradients, 0)))
+
+
+def _not_below(least: float, covariance: np.ndarray) -> np.ndarray:
+    """The same correlations, of sigmas to whose squares that of the least is added."""
+    sigma = np.sqrt(np.diag(covariance))
+    known = (sigma > 0.0) & np.isfinite(sigma)
+    wider = np.where(known, np.hypot(1.0, least / np.where(known, sigma, 1.0)), 1.0)
+    return covariance * np.outer(wider, wider) + np.diag(np.where(sigma > 0.0, 0.0, least**2))
 
 
 def _normal(jacobian: np.ndarray, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -78,7 +78,8 @@ def circle(bits: UInt, like: Scalar) -> Vec2:
     left = ((quarter + jnp.uint32(1)) & jnp.uint32(2)) != 0
     below = (quarter & jnp.uint32(2)) != 0
     across, along = where(turned, sine, cosine), where(turned, cosine, sine)
-    return jnp.stack([where(left, -1.0, 1.0) * across, where(below, -1.0, 1.0) * along])
+    one = jnp.ones((), like.dtype)
+    return jnp.stack([where(left, -one, one) * across, where(below, -one, one) * along])
 
 
 def odd_number(bits: UInt) -> UInt:
