@@ -53,16 +53,36 @@ def test_every_tier_is_tried():
         assert any(name.endswith(f"coat over {base}, tier schlick") for name in names)
 
 
-@pytest.mark.parametrize(("name", "kind"), [("corrected", "compact"), ("faithful", "compact"), ("faithful", "tables")])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("corrected, coat over conductor", "compact"),
+        ("corrected, coat over oren_nayar", "compact"),
+        ("corrected, two coats over conductor", "compact"),
+        ("faithful, coat over conductor", "compact"),
+        ("faithful, coat over conductor", "tables"),
+    ],
+)
 def test_tiers_have_derivatives(name, kind):
     """Along turns of the directions: at the normal and in the mirror direction roots of 0 had none."""
-    stack = structures()[f"{name}, coat over conductor"]
+    stack = structures()[name]
     tried = grid(stack, corners=2)
     pairs = tuple(w.astype(np.float32) for w in directions()[:2])
     found = tier.try_tier(kind, stack, tried, [tried.default], pairs, shaders=False)
     assert found is not None
     assert (found["materials"], found["not_finite"]) == (1, 0)
     assert found["value_max"] < 1e-5
+
+
+def test_the_shader_of_a_tier_is_drawn_at_places(gl):
+    """Of flakes, which differ from place to place."""
+    stack = structures()["corrected, coat over flakes"]
+    tried = grid(stack, corners=2)
+    pairs = tuple(w.astype(np.float32) for w in directions()[:2])
+    found = tier.try_tier("compact", stack, tried, [tried.default], pairs, shaders=True)
+    assert found is not None
+    assert found["not_finite"] == 0
+    assert found["shader_max"] < 1e-3
 
 
 def test_a_grid_holds_the_ends_of_all_ranges_and_what_is_close_to_them():

@@ -13,7 +13,7 @@ import numpy as np
 from ..forms.faithful import Faithful
 from ..render import predict
 from ..shader.export import print_material
-from ..shader.verify import FLOOR, compare, random_pairs, shade_samples
+from ..shader.verify import FLOOR, compare, random_pairs, random_places, shade_samples
 from ..stack import Stack
 from ..tiers.compact import compact, tables
 from .grid import Grid
@@ -69,6 +69,6 @@ def _values(stack: Stack, pairs: tuple[np.ndarray, np.ndarray], dtype: Any) -> t
 def _drawn(stack: Stack) -> tuple[int, float]:
     """How many numbers of its shader are not finite, and the largest error against JAX."""
     wi, wo = random_pairs(PAIRS, 0)
-    samples = wi[:, None], wo, np.ones_like(wi)[:, None]
+    samples = wi[:, None], wo, np.ones_like(wi)[:, None], random_places(PAIRS, 0) if stack.reads else None
     values = shade_samples(print_material(stack, "stability"), *samples)
     return int(np.sum(~np.isfinite(values))), compare(values, predict(stack, *samples), FLOOR / np.pi).max_rel

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import chunk, dot, member, static, struct
+from .._chunk import chunk, divide, dot, member, safe_sqrt, static, struct
 from .._place import Place
 from .._types import Colour, Scalar, Vec2, Vec3
 from ..forms import corrected
@@ -129,7 +129,7 @@ def lobe_way(
     bend = below[0] if absorbs else below
     path = below[1] if absorbs else jnp.zeros_like(below)
     z2 = 1.0 - bend * bend * sin2
-    leaves = edge(jnp.sqrt(jnp.maximum(sin2, 0.0)))
+    leaves = edge(safe_sqrt(sin2))
     return LobeWay(sin2, bend, z2, jnp.sqrt(z2), T, width, path, 1.0 - n * T, leaves)
 
 
@@ -158,7 +158,7 @@ def beckmann_hidden(alpha2: Vec3, z2: Scalar) -> Vec3:
     """
     a, b, most = MASKING
     slope2 = alpha2 * (1.0 - z2)
-    t = jnp.minimum(z2 / jnp.maximum(slope2, 1e-20), most)
+    t = jnp.minimum(divide(z2, jnp.maximum(slope2, 1e-20)), most)
     return jnp.sqrt(z2 + (1.0 / math.pi) * slope2 * jnp.exp(-(t * (a - b * t))))
 
 

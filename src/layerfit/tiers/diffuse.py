@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import chunk, member, static, struct, where
+from .._chunk import chunk, member, safe_sqrt, static, struct, where
 from .._types import Colour, Scalar
 from ..forms import one_coat
 from ..forms.crossing import cross
@@ -95,7 +95,7 @@ class DiffuseUnderCoat(Compact):
 def grooved_way(bent: Any, NoW: Scalar, hidden: Scalar, left: Colour) -> GroovedWay:
     """What grooves ask for of one direction below the coat."""
     sin2 = (1.0 - NoW) * (1.0 + NoW)
-    sine = jnp.sqrt(jnp.maximum(sin2, 0.0))
+    sine = safe_sqrt(sin2)
     bend = bent[0]
     z = jnp.sqrt(1.0 - bend * bend * sin2)
     return GroovedWay(NoW, hidden, left, sin2, sine, bend, z, bent[1] * (bend * sine))
