@@ -19,8 +19,10 @@ from layerfit.shader.choose import choose_tier
 from layerfit.shader.cost import instructions
 from layerfit.shader.export import print_material
 from layerfit.shader.verify import check_pairs
+from layerfit.stability.models import structures
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Flakes, Lambert, OrenNayar
+from layerfit.tiers.compact import refuses
 from layerfit.tiers.polynomial import Curve
 from layerfit.tiers.tier import TIERS, WALK, make_tier
 from layerfit.walk import walked
@@ -238,3 +240,9 @@ def test_a_polynomial_of_its_own_degree_is_found_again():
     assert p.degree == 3
     np.testing.assert_allclose(np.asarray(p(0.7)), [1.0 - 1.4 + 0.343, 0.245], rtol=1e-12)
     assert dataclasses.astuple(Curve(x, x).fit(1, 4))[4:] == (None,) * 7
+
+
+@pytest.mark.parametrize("name", structures())
+def test_every_structure_is_refused_in_words_or_not_at_all(name):
+    reason = refuses(structures()[name])
+    assert reason is None or " " in reason

@@ -160,7 +160,7 @@ _WHOLE: dict[str, Callable[..., list[Any]]] = {
     "reduce_max": _reduced(np.max),
     "argmax": _argmax,
     "power": lambda eqn, x: [_each(lambda base: base ** numbers().mpf(eqn.params["exponent"]), x)],
-    "rsqrt": lambda eqn, x: [_each(lambda square: 1 / numbers().sqrt(square), x)],
+    "rsqrt": lambda eqn, x: [_each(lambda square: _divided(1, numbers().sqrt(square)), x)],
     "integer_pow": lambda eqn, x: [np.asarray(x ** eqn.params["y"], object)],
     "slice": lambda eqn, x: (
         [x[tuple(map(slice, eqn.params["start_indices"], eqn.params["limit_indices"]))]]
@@ -176,10 +176,19 @@ def _truth(compare: Any) -> Callable[..., np.ndarray]:
     return lambda a, b: np.asarray(compare(a, b), bool)
 
 
+def _divided(x: Any, y: Any) -> Any:
+    """As numbers of a machine: what is divided by 0 is not finite, and no error, where a guard does not take it."""
+    mp = numbers()
+    if y != 0:
+        return x / y
+    return mp.nan if x == 0 or mp.isnan(x) else mp.inf * mp.sign(x)
+
+
 _BY_ELEMENT: dict[str, Callable[..., Any]] = {
     "add": operator.add,
     "sub": operator.sub,
     "mul": operator.mul,
+    "div": lambda x, y: _each(_divided, x, y),
     "neg": operator.neg,
     "abs": np.abs,
     "max": np.maximum,
@@ -211,7 +220,6 @@ _MOVES = {
 """What puts numbers elsewhere and changes none."""
 
 _MP = {
-    "div": "fdiv",
     "sqrt": "sqrt",
     "exp": "exp",
     "expm1": "expm1",

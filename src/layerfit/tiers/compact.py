@@ -18,6 +18,7 @@ from .._place import narrowed
 from ..forms.corrected import Corrected
 from ..forms.faithful import Faithful
 from ..forms.precise import Precise
+from ..layers import Coat
 from ..render import brdf
 from ..stack import Stack, at, evaluate
 from ..surfaces.diffuse import Lambert
@@ -46,6 +47,8 @@ def refuses(stack: Stack) -> str | None:
         return f"it varies over the surface by {', '.join(stack.reads)}"
     if isinstance(form, Faithful) and form != Faithful():
         return "it is made for the faithful form as published"
+    if other := next((layer.name for layer in coats if not isinstance(layer, Coat)), None):
+        return f"{other} is not a coat"
     if odd := next((coat.name for coat in coats if not plain(coat)), None):
         return f"{odd} is not isotropic GGX with the exact reflectance and Smith's masking"
     if hazy := next((coat.name for coat in coats if coat.tau_s is not None), None):
