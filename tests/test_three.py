@@ -3,9 +3,7 @@
 NODE_PATH names the folder that has the package `three`.
 """
 
-import os
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -13,16 +11,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from browser import chromium, evaluated
+from engines import THREE, engine_page, needs, radiance
 from layerfit.interchange import web
 from layerfit.interchange.engine import Engine
 from layerfit.preset import read_preset
 from layerfit.stack import evaluate, prepared
 from test_interchange import conversion
 
-FOLDERS = [Path(part) / "three" / "build" for part in os.environ.get("NODE_PATH", "").split(os.pathsep)]
-THREE = next((folder for folder in FOLDERS if folder.is_dir()), None)
-pytestmark = pytest.mark.skipif(THREE is None, reason="no three.js: npm install three, and name its node_modules in NODE_PATH")
+pytestmark = needs(THREE)
 
 SAME = 2e-3
 """Relative, of what has no table in it: three.js computes in float32, of settings written with six digits, at places between three vertices."""
@@ -35,30 +31,16 @@ SIDE = 12
 HALF_ANGLE = 55.0
 LIGHTS = [[0.0, 0.0, 1.0], [0.6, 0.2, 0.8], [-0.5, 0.7, 0.5], [0.9, -0.3, 0.25]]
 
-PAGE = """<!doctype html><script type="importmap">{"imports": {"three": "/three.module.js"}}</script>"""
-
 DRAW = """async ([name, source, lights, side, degrees]) => {
     const THREE = await import("three");
-    const renderer = (globalThis.renderer ??= new THREE.WebGLRenderer());
+    const { lit } = await import("/lit_three.js");
     const made = (await import(URL.createObjectURL(new Blob([source], { type: "text/javascript" }))))[name];
     const plane = new THREE.PlaneGeometry(40, 40);
     plane.setAttribute("tangent", new THREE.Float32BufferAttribute([1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1], 4));
-    const light = new THREE.DirectionalLight(0xffffff, Math.PI);
-    const scene = new THREE.Scene().add(new THREE.Mesh(plane, made), light);
-    const camera = new THREE.PerspectiveCamera(2 * degrees, 1, 0.1, 10);
-    camera.position.set(0, 0, 1);
-    const target = new THREE.WebGLRenderTarget(side, side, { type: THREE.FloatType });
-    return lights.map((place) => {
-        light.position.set(...place);
-        if (name === "shader") {
-            made.uniforms.u_eye.value.set(0, 0, 1);
-            made.uniforms.u_light.value = [new THREE.Vector4(...place, 0)];
-        }
-        renderer.setRenderTarget(target);
-        renderer.render(scene, camera);
-        const pixels = new Float32Array(4 * side * side);
-        renderer.readRenderTargetPixels(target, 0, 0, side, side, pixels);
-        return Array.from(pixels);
+    return lit(new THREE.Scene().add(new THREE.Mesh(plane, made)), lights, side, 1, 2 * degrees, (place) => {
+        if (name !== "shader") return;
+        made.uniforms.u_eye.value.set(0, 0, 1);
+        made.uniforms.u_light.value = [new THREE.Vector4(...place, 0)];
     });
 }"""
 """A plane seen from near by, so that a view differs from pixel to pixel, and a normal does not: three.js widens a lobe where it does."""
@@ -66,31 +48,13 @@ DRAW = """async ([name, source, lights, side, degrees]) => {
 
 @pytest.fixture(scope="module")
 def page():
-    """A page that finds three.js where pages find their modules."""
-    with chromium() as browser:
-        one = browser.new_page()
-        said = []
-        one.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
-        one.on("pageerror", lambda error: said.append(str(error)))
-        one.route("**/*", _serve)
-        one.goto("http://three.test/")
+    with engine_page(THREE) as one:
         yield one
-        one.close()
-        assert not said, said
-
-
-def _serve(route: Any) -> None:
-    name = route.request.url.rpartition("/")[2]
-    if name:
-        route.fulfill(path=str(THREE / name), content_type="text/javascript")  # pyright: ignore[reportOptionalOperand]
-    else:
-        route.fulfill(body=PAGE, content_type="text/html")
 
 
 def drawn(page, name, source):
     """Radiance (lights, pixels, 3) of what a module exports by that name."""
-    pixels = evaluated(page, DRAW, [name, source, LIGHTS, SIDE, HALF_ANGLE])
-    return np.reshape(pixels, (len(LIGHTS), -1, 4))[..., :3]
+    return radiance(page, DRAW, [name, source, LIGHTS, SIDE, HALF_ANGLE], len(LIGHTS))
 
 
 def wanted(brdf):
