@@ -10,9 +10,9 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from .groups import Rows, run_all
+from . import sharing
+from .groups import Rows
 from .rows import Row, failed, message
-from .sharing import portions
 from .tasks import Task
 from .worker import begin
 
@@ -29,7 +29,7 @@ def fitted(tasks: Mapping[str, Task], scheduler: str) -> Rows:
     with _client(scheduler) as client:
         from distributed import KilledWorker, as_completed  # pyright: ignore[reportMissingImports]
 
-        waiting = portions(tasks, max(1, _threads(client)))
+        waiting = sharing.portions(tasks, max(1, _threads(client)))
         ended = as_completed(loop=client.loop)
 
         def hand_over(some: Iterator[dict[str, Task]]) -> None:
@@ -62,7 +62,7 @@ _KILLED = "its worker was killed again and again, as by a machine out of memory;
 def run_portion(tasks: dict[str, Task]) -> list[tuple[str, Row]]:
     """What a worker of the cluster does at a time."""
     _begin_once()
-    return [row for rows in run_all(tasks) for row in rows]
+    return sharing.run_portion(tasks)
 
 
 @functools.cache

@@ -3,16 +3,12 @@
 import math
 from typing import Any
 
-import jax
-import jax.numpy as jnp
-import numpy as np
-
 from .._chunk import static, struct
 from .._types import Colour, Scalar
 from ..surfaces import Conductor
-from .polynomial import Curve, Polynomial
+from .polynomial import Polynomial
 from .surface import Compact, Recipe, half_root
-from .top import hidden_cosine
+from .top import half_cosines, hidden_cosine, reflectance_curve
 
 
 @struct
@@ -42,9 +38,7 @@ class BareMetal(Compact):
 
 def recipe(base: Conductor, name: str) -> Recipe:
     """The curve of a prepared metal, in double precision."""
-    c = np.linspace(0.0, 1.0, 400) ** 2
-    F = np.asarray(jax.vmap(base.reflectance)(jnp.asarray(c)))
-    curve = Curve(np.asarray(half_root(4.0 * c**2)), F) if base.has_film else Curve(4.0 * c**2, F, 1.0 / F)
+    curve = reflectance_curve(base, half_cosines())
     alpha: Any = base.width
     return Recipe(
         {"reflectance": curve}, lambda fitted: BareMetal(alpha * alpha, fitted["reflectance"], film=base.has_film, name=name)

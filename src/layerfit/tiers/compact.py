@@ -24,7 +24,7 @@ from ..stack import Stack, at, evaluate
 from ..surfaces.diffuse import Lambert
 from ..surfaces.flakes import Flakes
 from ..surfaces.microfacet import Conductor
-from . import bare, corrected_metal, corrected_stack, diffuse, faithful, precise_metal, tables as precomputed
+from . import bare, corrected_stack, diffuse, faithful, precise_metal, tables as precomputed
 from .polynomial import MOST
 from .surface import Compact, Recipe, noted, plain
 
@@ -144,11 +144,9 @@ def _recipe(stack: Stack) -> Recipe:
         return bare.recipe(prepared, name)
     if isinstance(stack.form, Faithful):
         return faithful.recipe(prepared, name)
-    if len(stack.layers) > 1 or (stack.base.lobes and not _plain_metal(stack.base)):
-        return corrected_stack.recipe(prepared, name)
-    if not stack.base.lobes:
+    if len(stack.layers) == 1 and not stack.base.lobes:
         return diffuse.recipe(prepared, name, lambda prepared, wi, wo: evaluate(stack.form, prepared, wi, wo))
-    return precise_metal.recipe(prepared, name) if isinstance(stack.form, Precise) else corrected_metal.recipe(prepared, name)
+    return (precise_metal if isinstance(stack.form, Precise) else corrected_stack).recipe(prepared, name)
 
 
 def _padded(recipe: Recipe, degrees: dict[str, int]) -> Compact:

@@ -24,11 +24,11 @@ from ..optics.interface import steer
 from ..surfaces import Conductor, Flakes, Lambert
 from ..surfaces.base import Surface
 from ..surfaces.flakes import FlakeLobe
-from .corrected_metal import ORDERS
 from .polynomial import Curve, Polynomial
 from .surface import Argument, Compact, Recipe, argument, at, best_argument, colour_of, cosines, half_root
-from .top import coat_lobe, hidden_cosine
+from .top import coat_lobe, filmed, hidden_cosine, reflectance_curve
 
+ORDERS = 3
 MASKING = (1.14077, 0.0123766, 9.0)
 """Of `beckmann_hidden`: a, b and the largest t, where its error is smallest."""
 
@@ -377,19 +377,15 @@ def _covered(
     grown = np.asarray(widened(jnp.asarray(width))) ** 2
     drawn = np.asarray(lobe.paint.sigma) ** 2 if isinstance(lobe, FlakeLobe) else 0.0  # near by, the lobe has the rest alone
     cosine = np.linspace(0.98 * float(met["z"].min()), 1.0, len(NoW))
-    film = bool(getattr(lobe, "has_film", False))
-    F = np.asarray(jax.vmap(lobe.reflectance)(jnp.asarray(cosine)))
     curves = {
         "passed": Curve(2.0 * at("facet", NoW, tilt) - 1.0, energy, 1.0 / energy),
         "refracted": Curve(NoW, refracted, 1.0 / refracted),
         "edge": Curve(np.sqrt(1.0 - NoW**2), met["edge"]),
         "variance": Curve(width, grown if ggx else grown - own2, 1.0 / (grown - drawn), 6),
-        "reflectance": Curve(
-            np.asarray(half_root(4.0 * cosine**2)) if film else 4.0 * cosine**2, F, 1.0 if film else 1.0 / F, 10 if film else 6
-        ),
+        "reflectance": reflectance_curve(lobe, cosine, 6),
     }
     if depth > 1:
         curves["back"] = Curve(NoW, met["R"])
     n = float(np.prod([float(coat.eta) for coat in coats[:depth]]))
-    rest = {"own2": own2, "n": jnp.asarray(n), "tau": above.extinction, "distribution": lobe.distribution, "film": film}
+    rest = {"own2": own2, "n": jnp.asarray(n), "tau": above.extinction, "distribution": lobe.distribution, "film": filmed(lobe)}
     return curves, rest

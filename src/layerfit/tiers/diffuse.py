@@ -20,7 +20,7 @@ from ..optics.interface import with_second_facet
 from ..surfaces.diffuse import Lambert, OrenNayar
 from .polynomial import Curve, Polynomial
 from .surface import Argument, Compact, Recipe, argument, at, best_argument, colour_of, cosines
-from .top import coat_lobe, film_curve, filmed_lobe, hidden_cosine, without_film
+from .top import coat_lobe, filmed_lobe, half_cosines, hidden_cosine, reflectance_curve, without_film
 
 
 @struct
@@ -156,7 +156,7 @@ def recipe(prepared: Any, name: str, evaluate: Any) -> Recipe:
 
     NoW = cosines()
     closed, root, T, beyond, bent = (np.asarray(a) for a in jax.vmap(follow)(jnp.asarray(NoW)))
-    film = film_curve(coat) if coat.has_film else None
+    film = reflectance_curve(coat, half_cosines()) if coat.has_film else None
     left = root / (T if root.ndim == T.ndim else T[:, None])
     if precise:
         left = np.column_stack([left, beyond])

@@ -16,7 +16,7 @@ from ..layers import Coat
 from ..optics.interface import rough_transmittance
 from .polynomial import Curve, Polynomial
 from .surface import Compact, Recipe, colour_of, cosines
-from .top import coat_lobe, hidden_cosine
+from .top import coat_lobe, hidden_cosine, reflectance_curve
 
 
 @struct
@@ -213,7 +213,6 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
     closed = np.asarray(jax.vmap(lambda c: rough_transmittance(c, eta, interface.gain))(jnp.asarray(facet))) / eta
     theta = np.linspace(0.0, bent[:, 3].max() * sum(one_coat.DIRECT), len(NoW))
     cosine = np.linspace(0.98 * z.min(), 1.0, len(NoW))
-    F = np.asarray(jax.vmap(base.reflectance)(jnp.asarray(cosine)))
     alphas = jnp.stack([base.width, wider(base.width, coat.width)])
     widths = power(alphas)
     M = np.linspace(1.96 * z.min(), 2.0, len(NoW))
@@ -227,7 +226,7 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
         "again": Curve(s, second),
         "own": Curve(M, raised, 1.0 / raised, 4),
         "variance": Curve(total, size, 1.0 / size, 5),
-        "reflectance": Curve(4.0 * cosine**2, F, 1.0 / F, 6),
+        "reflectance": reflectance_curve(base, cosine, 6),
     }
     if coat.tau is not None:
         root = np.squeeze(np.asarray(spread_root(theta[:, None], jnp.asarray(coat.tau))))

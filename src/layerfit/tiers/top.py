@@ -15,9 +15,10 @@ import numpy as np
 from .._chunk import chunk, divide
 from .._types import Colour, Scalar
 from ..layers import Coat
+from ..surfaces.base import Lobe
 from ..surfaces.film import Baked
-from .polynomial import Curve, Polynomial
-from .surface import half_root
+from .polynomial import MOST, Curve, Polynomial
+from .surface import NODES, half_root
 
 
 @chunk
@@ -59,11 +60,22 @@ def filmed_lobe(
     return film(half_root(s2)) * (ratio * ratio * V)
 
 
-def film_curve(coat: Coat) -> Curve:
-    """Reflectance of a coat's top with a film, by `half_root`."""
-    c = np.linspace(0.0, 1.0, 400) ** 2
-    F = np.asarray(jax.vmap(coat.reflectance)(jnp.asarray(c)))
-    return Curve(np.asarray(half_root(4.0 * c**2)), F)
+def filmed(lobe: Lobe) -> bool:
+    """Whether there is a film on its facets."""
+    return bool(getattr(lobe, "has_film", False))
+
+
+def reflectance_curve(lobe: Lobe, c: np.ndarray, most: int = MOST) -> Curve:
+    """What its facets reflect at half cosines c, of four times their squares; with a film by `half_root`, and of any degree."""
+    F = np.asarray(jax.vmap(lobe.reflectance)(jnp.asarray(c)))
+    if filmed(lobe):
+        return Curve(np.asarray(half_root(4.0 * c**2)), F)
+    return Curve(4.0 * c**2, F, 1.0 / F, most)
+
+
+def half_cosines() -> np.ndarray:
+    """Half cosines (n,) from 0 to 1, closer at grazing."""
+    return np.linspace(0.0, 1.0, NODES) ** 2
 
 
 def without_film(coat: Coat) -> Coat:
