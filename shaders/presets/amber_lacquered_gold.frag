@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Conductor {
@@ -66,18 +66,18 @@ const Coat lf_shellac = Coat(
 );
 
 const Interface lf_shellac_interface = Interface(
-    0.010720346,                                      // tilt: turn of the mean facet towards a grazing direction
-    0.009790741,                                      // gain: part of the reflected light that a second facet lets in
-    vec3(-0.024019195, 0.037430365, -0.012146365),    // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(-0.008774286, 0.01589695, -0.00900097),      // passed_high: the other three, of higher powers
-    vec3(0.01888021, -0.03414776, 0.028381942),       // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.020505816, 0.009172212, -0.00040528714),  // bend_high: 
-    vec3(0.7622598, -0.35900348, 0.3005035),          // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.38898873, 0.0026233941, 0.06684631),      // spread_high: 
-    vec3(1.0406599, -0.08520222, 0.085663974),        // path: mean path over that of the refracted direction
-    vec3(-0.055683732, -0.002040565, 0.01779306),     // path_high: 
-    vec3(0.09075124, -0.2020707, 0.24339886),         // theta: scale of the path's distribution
-    vec3(-0.256472, 0.061698347, 0.08315918)          // theta_high: 
+    0.010720346,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.009790741,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.024019195, 0.037430365, -0.012146365, -0.008774286),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.01589695, -0.00900097),                                // passed_high: the other two, of higher powers
+    vec4(0.01888021, -0.03414776, 0.028381942, -0.020505816),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.009172212, -0.00040528714),                            // bend_high: 
+    vec4(0.7622598, -0.35900348, 0.3005035, -0.38898873),         // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.0026233941, 0.06684631),                               // spread_high: 
+    vec4(1.0406599, -0.08520222, 0.085663974, -0.055683732),      // path: mean path over that of the refracted direction
+    vec2(-0.002040565, 0.01779306),                               // path_high: 
+    vec4(0.09075124, -0.2020707, 0.24339886, -0.256472),          // theta: scale of the path's distribution
+    vec2(0.061698347, 0.08315918)                                 // theta_high: 
 );
 
 const Conductor lf_gold = Conductor(
@@ -130,8 +130,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

@@ -18,16 +18,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Conductor {
@@ -69,18 +69,18 @@ const Coat lf_oxide = Coat(
 );
 
 const Interface lf_oxide_interface = Interface(
-    0.030373108,                                      // tilt: turn of the mean facet towards a grazing direction
-    0.051016223,                                      // gain: part of the reflected light that a second facet lets in
-    vec3(-0.03604947, 0.010694278, 0.02764687),       // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.0047039147, -0.007703439, -0.0034511923),  // passed_high: the other three, of higher powers
-    vec3(0.10008009, -0.14083755, 0.047642227),       // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(0.011817302, -0.011681536, 0.0024273526),    // bend_high: 
-    vec3(0.8590729, -0.43609256, 0.091488555),        // spread: width of a lobe seen through it, over that of the facets
-    vec3(0.071232915, -0.10349935, -0.044332564),     // spread_high: 
-    vec3(1.1351962, -0.21217495, 0.067353785),        // path: mean path over that of the refracted direction
-    vec3(0.038277626, -0.021671832, -0.002115488),    // path_high: 
-    vec3(0.41057786, -0.7462359, 0.3733016),          // theta: scale of the path's distribution
-    vec3(0.0021906942, -0.08426255, 0.08728502)       // theta_high: 
+    0.030373108,                                               // tilt: turn of the mean facet towards a grazing direction
+    0.051016223,                                               // gain: part of the reflected light that a second facet lets in
+    vec4(-0.03604947, 0.010694278, 0.02764687, 0.0047039147),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(-0.007703439, -0.0034511923),                         // passed_high: the other two, of higher powers
+    vec4(0.10008009, -0.14083755, 0.047642227, 0.011817302),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(-0.011681536, 0.0024273526),                          // bend_high: 
+    vec4(0.8590729, -0.43609256, 0.091488555, 0.071232915),    // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.10349935, -0.044332564),                           // spread_high: 
+    vec4(1.1351962, -0.21217495, 0.067353785, 0.038277626),    // path: mean path over that of the refracted direction
+    vec2(-0.021671832, -0.002115488),                          // path_high: 
+    vec4(0.41057786, -0.7462359, 0.3733016, 0.0021906942),     // theta: scale of the path's distribution
+    vec2(-0.08426255, 0.08728502)                              // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -109,18 +109,18 @@ const Curve lf_oxide_rest = Curve(
 );
 
 const Interface lf_oxide_across = Interface(
-    0.07474731,                                     // tilt: turn of the mean facet towards a grazing direction
-    0.19855128,                                     // gain: part of the reflected light that a second facet lets in
-    vec3(-0.0848371, 0.031376388, -0.008033876),    // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.03345237, 0.01668107, -0.007443741),     // passed_high: the other three, of higher powers
-    vec3(0.2908306, -0.17414103, -0.08314511),      // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.010737725, 0.022834145, 0.013541639),   // bend_high: 
-    vec3(0.6156385, -0.029582255, -0.07202415),     // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.04607129, -0.026856184, -0.013792217),  // spread_high: 
-    vec3(1.272488, -0.24106285, -0.07674903),       // path: mean path over that of the refracted direction
-    vec3(0.038464427, 0.026356637, 0.0006881952),   // path_high: 
-    vec3(0.9425542, -1.0819294, -0.15661979),       // theta: scale of the path's distribution
-    vec3(0.31639296, 0.092320696, -0.033271924)     // theta_high: 
+    0.07474731,                                               // tilt: turn of the mean facet towards a grazing direction
+    0.19855128,                                               // gain: part of the reflected light that a second facet lets in
+    vec4(-0.0848371, 0.031376388, -0.008033876, 0.03345237),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.01668107, -0.007443741),                           // passed_high: the other two, of higher powers
+    vec4(0.2908306, -0.17414103, -0.08314511, -0.010737725),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.022834145, 0.013541639),                           // bend_high: 
+    vec4(0.6156385, -0.029582255, -0.07202415, -0.04607129),  // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.026856184, -0.013792217),                         // spread_high: 
+    vec4(1.272488, -0.24106285, -0.07674903, 0.038464427),    // path: mean path over that of the refracted direction
+    vec2(0.026356637, 0.0006881952),                          // path_high: 
+    vec4(0.9425542, -1.0819294, -0.15661979, 0.31639296),     // theta: scale of the path's distribution
+    vec2(0.092320696, -0.033271924)                           // theta_high: 
 );
 
 // How much of a rough top's effect on light is by slopes along the tangent: half of it at the normal, all along the tangent.
@@ -133,16 +133,16 @@ Interface lf_mixed(Interface tangent, Interface across, float share) {
     float rest = 1.0 - share;
     float tilt = share * tangent.tilt + rest * across.tilt;
     float gain = share * tangent.gain + rest * across.gain;
-    vec3 passed = share * tangent.passed + rest * across.passed;
-    vec3 passed_high = share * tangent.passed_high + rest * across.passed_high;
-    vec3 bend = share * tangent.bend + rest * across.bend;
-    vec3 bend_high = share * tangent.bend_high + rest * across.bend_high;
-    vec3 spread = share * tangent.spread + rest * across.spread;
-    vec3 spread_high = share * tangent.spread_high + rest * across.spread_high;
-    vec3 path = share * tangent.path + rest * across.path;
-    vec3 path_high = share * tangent.path_high + rest * across.path_high;
-    vec3 theta = share * tangent.theta + rest * across.theta;
-    vec3 theta_high = share * tangent.theta_high + rest * across.theta_high;
+    vec4 passed = share * tangent.passed + rest * across.passed;
+    vec2 passed_high = share * tangent.passed_high + rest * across.passed_high;
+    vec4 bend = share * tangent.bend + rest * across.bend;
+    vec2 bend_high = share * tangent.bend_high + rest * across.bend_high;
+    vec4 spread = share * tangent.spread + rest * across.spread;
+    vec2 spread_high = share * tangent.spread_high + rest * across.spread_high;
+    vec4 path = share * tangent.path + rest * across.path;
+    vec2 path_high = share * tangent.path_high + rest * across.path_high;
+    vec4 theta = share * tangent.theta + rest * across.theta;
+    vec2 theta_high = share * tangent.theta_high + rest * across.theta_high;
     return Interface(tilt, gain, passed, passed_high, bend, bend_high, spread, spread_high, path, path_high, theta, theta_high);
 }
 
@@ -172,8 +172,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

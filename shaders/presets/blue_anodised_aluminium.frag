@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Conductor {
@@ -66,18 +66,18 @@ const Coat lf_oxide = Coat(
 );
 
 const Interface lf_oxide_interface = Interface(
-    0.046419457,                                    // tilt: turn of the mean facet towards a grazing direction
-    0.10031511,                                     // gain: part of the reflected light that a second facet lets in
-    vec3(-0.04464719, 0.00010519335, 0.016922252),  // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.03386515, -0.0017023832, -0.012983762),  // passed_high: the other three, of higher powers
-    vec3(0.17456408, -0.18511207, -0.0043630255),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(0.038041946, 0.00433427, -0.0060364865),   // bend_high: 
-    vec3(0.79491526, -0.2609493, -0.08429666),      // spread: width of a lobe seen through it, over that of the facets
-    vec3(0.0621534, -0.023329884, -0.05259615),     // spread_high: 
-    vec3(1.1995243, -0.24667987, -0.003308177),     // path: mean path over that of the refracted direction
-    vec3(0.06897068, 0.004082501, -0.013128996),    // path_high: 
-    vec3(0.6451652, -0.96579504, 0.16259342),       // theta: scale of the path's distribution
-    vec3(0.2337165, -0.020245273, 0.0012745932)     // theta_high: 
+    0.046419457,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.10031511,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.04464719, 0.00010519335, 0.016922252, 0.03386515),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(-0.0017023832, -0.012983762),                          // passed_high: the other two, of higher powers
+    vec4(0.17456408, -0.18511207, -0.0043630255, 0.038041946),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.00433427, -0.0060364865),                            // bend_high: 
+    vec4(0.79491526, -0.2609493, -0.08429666, 0.0621534),       // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.023329884, -0.05259615),                            // spread_high: 
+    vec4(1.1995243, -0.24667987, -0.003308177, 0.06897068),     // path: mean path over that of the refracted direction
+    vec2(0.004082501, -0.013128996),                            // path_high: 
+    vec4(0.6451652, -0.96579504, 0.16259342, 0.2337165),        // theta: scale of the path's distribution
+    vec2(-0.020245273, 0.0012745932)                            // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -130,8 +130,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Conductor {
@@ -66,18 +66,18 @@ const Coat lf_glass = Coat(
 );
 
 const Interface lf_glass_interface = Interface(
-    0.0031546694,                                      // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                      // gain: part of the reflected light that a second facet lets in
-    vec3(-0.0095665855, 0.02155129, -0.023891417),     // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.015120622, 0.006776768, -0.010278594),      // passed_high: the other three, of higher powers
-    vec3(0.003618297, -0.006836458, 0.0020751434),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.00092199584, 0.0109949745, -0.008830786),  // bend_high: 
-    vec3(0.7543955, -0.22650662, -0.1283072),          // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.057732522, 0.4508241, -0.40081078),        // spread_high: 
-    vec3(1.0096666, -0.020288736, 0.014123499),        // path: mean path over that of the refracted direction
-    vec3(-0.017482638, 0.037245095, -0.023303747),     // path_high: 
-    vec3(0.020642612, -0.03597436, 0.01141594),        // theta: scale of the path's distribution
-    vec3(-0.083641335, 0.14392288, -0.04268641)        // theta_high: 
+    0.0031546694,                                                   // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                   // gain: part of the reflected light that a second facet lets in
+    vec4(-0.0095665855, 0.02155129, -0.023891417, 0.015120622),     // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.006776768, -0.010278594),                                // passed_high: the other two, of higher powers
+    vec4(0.003618297, -0.006836458, 0.0020751434, -0.00092199584),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.0109949745, -0.008830786),                               // bend_high: 
+    vec4(0.7543955, -0.22650662, -0.1283072, -0.057732522),         // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.4508241, -0.40081078),                                   // spread_high: 
+    vec4(1.0096666, -0.020288736, 0.014123499, -0.017482638),       // path: mean path over that of the refracted direction
+    vec2(0.037245095, -0.023303747),                                // path_high: 
+    vec4(0.020642612, -0.03597436, 0.01141594, -0.083641335),       // theta: scale of the path's distribution
+    vec2(0.14392288, -0.04268641)                                   // theta_high: 
 );
 
 const Conductor lf_silver = Conductor(
@@ -130,8 +130,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Conductor {
@@ -67,18 +67,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.010720346,                                     // tilt: turn of the mean facet towards a grazing direction
-    0.009790741,                                     // gain: part of the reflected light that a second facet lets in
-    vec3(-0.02416102, 0.037756085, -0.01229288),     // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(-0.008737861, 0.015993359, -0.009139275),   // passed_high: the other three, of higher powers
-    vec3(0.01835048, -0.033296723, 0.02771719),      // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.019966267, 0.008862132, -0.0003390262),  // bend_high: 
-    vec3(0.75101304, -0.35615644, 0.2937088),        // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.38354492, 0.001817733, 0.06761384),      // spread_high: 
-    vec3(1.0406462, -0.08552843, 0.08595249),        // path: mean path over that of the refracted direction
-    vec3(-0.055620193, -0.0024152398, 0.018114805),  // path_high: 
-    vec3(0.08841845, -0.19763331, 0.23841499),       // theta: scale of the path's distribution
-    vec3(-0.2506254, 0.060514007, 0.080532625)       // theta_high: 
+    0.010720346,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.009790741,                                                // gain: part of the reflected light that a second facet lets in
+    vec4(-0.02416102, 0.037756085, -0.01229288, -0.008737861),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.015993359, -0.009139275),                            // passed_high: the other two, of higher powers
+    vec4(0.01835048, -0.033296723, 0.02771719, -0.019966267),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.008862132, -0.0003390262),                           // bend_high: 
+    vec4(0.75101304, -0.35615644, 0.2937088, -0.38354492),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.001817733, 0.06761384),                              // spread_high: 
+    vec4(1.0406462, -0.08552843, 0.08595249, -0.055620193),     // path: mean path over that of the refracted direction
+    vec2(-0.0024152398, 0.018114805),                           // path_high: 
+    vec4(0.08841845, -0.19763331, 0.23841499, -0.2506254),      // theta: scale of the path's distribution
+    vec2(0.060514007, 0.080532625)                              // theta_high: 
 );
 
 const Conductor lf_brass = Conductor(
@@ -132,8 +132,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

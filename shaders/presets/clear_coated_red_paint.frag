@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Lambert {
@@ -46,18 +46,18 @@ const Coat lf_clear_coat = Coat(
 );
 
 const Interface lf_clear_coat_interface = Interface(
-    0.0031546694,                                     // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                     // gain: part of the reflected light that a second facet lets in
-    vec3(-0.00965715, 0.021873731, -0.0242624),       // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.015375613, 0.0068878005, -0.010487776),    // passed_high: the other three, of higher powers
-    vec3(0.0033821939, -0.0064339936, 0.001987853),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.00090263993, 0.010334163, -0.008277145),  // bend_high: 
-    vec3(0.72952676, -0.2272397, -0.12848555),        // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.058554053, 0.43840846, -0.38560963),      // spread_high: 
-    vec3(1.009759, -0.020711154, 0.014585555),        // path: mean path over that of the refracted direction
-    vec3(-0.017857552, 0.037453353, -0.02328682),     // path_high: 
-    vec3(0.019467048, -0.03448579, 0.0112755345),     // theta: scale of the path's distribution
-    vec3(-0.07768409, 0.13575086, -0.04182259)        // theta_high: 
+    0.0031546694,                                                    // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                    // gain: part of the reflected light that a second facet lets in
+    vec4(-0.00965715, 0.021873731, -0.0242624, 0.015375613),         // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.0068878005, -0.010487776),                                // passed_high: the other two, of higher powers
+    vec4(0.0033821939, -0.0064339936, 0.001987853, -0.00090263993),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.010334163, -0.008277145),                                 // bend_high: 
+    vec4(0.72952676, -0.2272397, -0.12848555, -0.058554053),         // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.43840846, -0.38560963),                                   // spread_high: 
+    vec4(1.009759, -0.020711154, 0.014585555, -0.017857552),         // path: mean path over that of the refracted direction
+    vec2(0.037453353, -0.02328682),                                  // path_high: 
+    vec4(0.019467048, -0.03448579, 0.0112755345, -0.07768409),       // theta: scale of the path's distribution
+    vec2(0.13575086, -0.04182259)                                    // theta_high: 
 );
 
 const Lambert lf_paint = Lambert(
@@ -92,8 +92,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

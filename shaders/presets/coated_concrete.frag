@@ -16,16 +16,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -49,18 +49,18 @@ const Coat lf_sealer = Coat(
 );
 
 const Interface lf_sealer_interface = Interface(
-    0.016290857,                                      // tilt: turn of the mean facet towards a grazing direction
-    0.018790323,                                      // gain: part of the reflected light that a second facet lets in
-    vec3(-0.030293863, 0.03411546, 0.007858283),      // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(-0.016438136, 0.0055495244, -0.0017564549),  // passed_high: the other three, of higher powers
-    vec3(0.032763314, -0.057083204, 0.041801285),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.019719291, -0.0017260615, 0.0064610373),  // bend_high: 
-    vec3(0.7569307, -0.4166647, 0.2770872),           // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.21254128, -0.11134212, 0.0695622),        // spread_high: 
-    vec3(1.0665971, -0.13207102, 0.09955791),         // path: mean path over that of the refracted direction
-    vec3(-0.031070113, -0.02146858, 0.020035863),     // path_high: 
-    vec3(0.15087932, -0.33279446, 0.3304903),         // theta: scale of the path's distribution
-    vec3(-0.2277554, -0.014587497, 0.115838975)       // theta_high: 
+    0.016290857,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.018790323,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.030293863, 0.03411546, 0.007858283, -0.016438136),   // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.0055495244, -0.0017564549),                           // passed_high: the other two, of higher powers
+    vec4(0.032763314, -0.057083204, 0.041801285, -0.019719291),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(-0.0017260615, 0.0064610373),                           // bend_high: 
+    vec4(0.7569307, -0.4166647, 0.2770872, -0.21254128),         // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.11134212, 0.0695622),                                // spread_high: 
+    vec4(1.0665971, -0.13207102, 0.09955791, -0.031070113),      // path: mean path over that of the refracted direction
+    vec2(-0.02146858, 0.020035863),                              // path_high: 
+    vec4(0.15087932, -0.33279446, 0.3304903, -0.2277554),        // theta: scale of the path's distribution
+    vec2(-0.014587497, 0.115838975)                              // theta_high: 
 );
 
 const OrenNayar lf_concrete = OrenNayar(
@@ -109,8 +109,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

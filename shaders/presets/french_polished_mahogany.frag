@@ -16,16 +16,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -49,18 +49,18 @@ const Coat lf_shellac = Coat(
 );
 
 const Interface lf_shellac_interface = Interface(
-    0.0031546694,                                     // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                     // gain: part of the reflected light that a second facet lets in
-    vec3(-0.009618692, 0.021733595, -0.024097253),    // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.0152621865, 0.0068437173, -0.0104005365),  // passed_high: the other three, of higher powers
-    vec3(0.003477717, -0.0065967487, 0.002022285),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.00091052987, 0.01060319, -0.008502161),   // bend_high: 
-    vec3(0.7398473, -0.22701198, -0.12849008),        // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.05826497, 0.44370586, -0.39202416),       // spread_high: 
-    vec3(1.0097235, -0.02054125, 0.014399737),        // path: mean path over that of the refracted direction
-    vec3(-0.017715454, 0.037379563, -0.02329731),     // path_high: 
-    vec3(0.019935852, -0.035078302, 0.011336705),     // theta: scale of the path's distribution
-    vec3(-0.08009496, 0.13903353, -0.042160243)       // theta_high: 
+    0.0031546694,                                                   // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                   // gain: part of the reflected light that a second facet lets in
+    vec4(-0.009618692, 0.021733595, -0.024097253, 0.0152621865),    // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.0068437173, -0.0104005365),                              // passed_high: the other two, of higher powers
+    vec4(0.003477717, -0.0065967487, 0.002022285, -0.00091052987),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.01060319, -0.008502161),                                 // bend_high: 
+    vec4(0.7398473, -0.22701198, -0.12849008, -0.05826497),         // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.44370586, -0.39202416),                                  // spread_high: 
+    vec4(1.0097235, -0.02054125, 0.014399737, -0.017715454),        // path: mean path over that of the refracted direction
+    vec2(0.037379563, -0.02329731),                                 // path_high: 
+    vec4(0.019935852, -0.035078302, 0.011336705, -0.08009496),      // theta: scale of the path's distribution
+    vec2(0.13903353, -0.042160243)                                  // theta_high: 
 );
 
 const OrenNayar lf_mahogany = OrenNayar(
@@ -109,8 +109,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

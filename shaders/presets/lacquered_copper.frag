@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Conductor {
@@ -66,18 +66,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.030373108,                                     // tilt: turn of the mean facet towards a grazing direction
-    0.051016223,                                     // gain: part of the reflected light that a second facet lets in
-    vec3(-0.037516396, 0.012820616, 0.028922228),    // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.005808585, -0.008892238, -0.004150729),   // passed_high: the other three, of higher powers
-    vec3(0.08205869, -0.11701773, 0.038625695),      // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(0.011266199, -0.009455263, 0.0018412061),   // bend_high: 
-    vec3(0.7690234, -0.39006528, 0.056888446),       // spread: width of a lobe seen through it, over that of the facets
-    vec3(0.061820567, -0.08834498, -0.038719773),    // spread_high: 
-    vec3(1.1297681, -0.20916545, 0.06399265),        // path: mean path over that of the refracted direction
-    vec3(0.041727543, -0.020676017, -0.0021613836),  // path_high: 
-    vec3(0.3402057, -0.6483584, 0.3542442),          // theta: scale of the path's distribution
-    vec3(-0.015058003, -0.08199707, 0.081555456)     // theta_high: 
+    0.030373108,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.051016223,                                                // gain: part of the reflected light that a second facet lets in
+    vec4(-0.037516396, 0.012820616, 0.028922228, 0.005808585),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(-0.008892238, -0.004150729),                           // passed_high: the other two, of higher powers
+    vec4(0.08205869, -0.11701773, 0.038625695, 0.011266199),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(-0.009455263, 0.0018412061),                           // bend_high: 
+    vec4(0.7690234, -0.39006528, 0.056888446, 0.061820567),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.08834498, -0.038719773),                            // spread_high: 
+    vec4(1.1297681, -0.20916545, 0.06399265, 0.041727543),      // path: mean path over that of the refracted direction
+    vec2(-0.020676017, -0.0021613836),                          // path_high: 
+    vec4(0.3402057, -0.6483584, 0.3542442, -0.015058003),       // theta: scale of the path's distribution
+    vec2(-0.08199707, 0.081555456)                              // theta_high: 
 );
 
 const Conductor lf_copper = Conductor(
@@ -130,8 +130,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -47,18 +47,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.0514843,                                      // tilt: turn of the mean facet towards a grazing direction
-    0.11758662,                                     // gain: part of the reflected light that a second facet lets in
-    vec3(-0.051513065, 0.0059220353, 0.011182629),  // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.04249962, 0.0011268947, -0.016593136),   // passed_high: the other three, of higher powers
-    vec3(0.15997663, -0.15549923, -0.020663086),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(0.030586995, 0.009913275, -0.0038092807),  // bend_high: 
-    vec3(0.67365825, -0.17226803, -0.10509278),     // spread: width of a lobe seen through it, over that of the facets
-    vec3(0.01729983, -0.011321053, -0.033619165),   // spread_high: 
-    vec3(1.2000802, -0.23994064, -0.020671934),     // path: mean path over that of the refracted direction
-    vec3(0.067613125, 0.011690021, -0.010590792),   // path_high: 
-    vec3(0.59302557, -0.9069695, 0.14514132),       // theta: scale of the path's distribution
-    vec3(0.23783478, -0.018604606, -0.007173978)    // theta_high: 
+    0.0514843,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.11758662,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.051513065, 0.0059220353, 0.011182629, 0.04249962),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.0011268947, -0.016593136),                           // passed_high: the other two, of higher powers
+    vec4(0.15997663, -0.15549923, -0.020663086, 0.030586995),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.009913275, -0.0038092807),                           // bend_high: 
+    vec4(0.67365825, -0.17226803, -0.10509278, 0.01729983),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.011321053, -0.033619165),                           // spread_high: 
+    vec4(1.2000802, -0.23994064, -0.020671934, 0.067613125),    // path: mean path over that of the refracted direction
+    vec2(0.011690021, -0.010590792),                            // path_high: 
+    vec4(0.59302557, -0.9069695, 0.14514132, 0.23783478),       // theta: scale of the path's distribution
+    vec2(-0.018604606, -0.007173978)                            // theta_high: 
 );
 
 const OrenNayar lf_oak = OrenNayar(
@@ -107,8 +107,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

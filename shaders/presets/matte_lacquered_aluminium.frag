@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Conductor {
@@ -66,18 +66,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.08523813,                                      // tilt: turn of the mean facet towards a grazing direction
-    0.23253432,                                      // gain: part of the reflected light that a second facet lets in
-    vec3(-0.117580555, 0.06625485, -0.008904142),    // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.026615268, 0.019321598, -0.003716942),    // passed_high: the other three, of higher powers
-    vec3(0.25976497, -0.125767, -0.07634101),        // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.027794093, 0.01541426, 0.016349174),     // bend_high: 
-    vec3(0.47685713, 0.016207732, -0.037082642),     // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.043587685, -0.036313757, -0.016467094),  // spread_high: 
-    vec3(1.2581091, -0.23291034, -0.06929138),       // path: mean path over that of the refracted direction
-    vec3(0.040068626, 0.022292376, 8.940697e-06),    // path_high: 
-    vec3(0.86954325, -1.0685096, -0.09935013),       // theta: scale of the path's distribution
-    vec3(0.33906257, 0.066010416, -0.044408634)      // theta_high: 
+    0.08523813,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.23253432,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.117580555, 0.06625485, -0.008904142, 0.026615268),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.019321598, -0.003716942),                            // passed_high: the other two, of higher powers
+    vec4(0.25976497, -0.125767, -0.07634101, -0.027794093),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.01541426, 0.016349174),                              // bend_high: 
+    vec4(0.47685713, 0.016207732, -0.037082642, -0.043587685),  // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.036313757, -0.016467094),                           // spread_high: 
+    vec4(1.2581091, -0.23291034, -0.06929138, 0.040068626),     // path: mean path over that of the refracted direction
+    vec2(0.022292376, 8.940697e-06),                            // path_high: 
+    vec4(0.86954325, -1.0685096, -0.09935013, 0.33906257),      // theta: scale of the path's distribution
+    vec2(0.066010416, -0.044408634)                             // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -130,8 +130,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

@@ -16,16 +16,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -49,18 +49,18 @@ const Coat lf_oil = Coat(
 );
 
 const Interface lf_oil_interface = Interface(
-    0.07902597,                                     // tilt: turn of the mean facet towards a grazing direction
-    0.21274194,                                     // gain: part of the reflected light that a second facet lets in
-    vec3(-0.102022186, 0.05346267, -0.00935491),    // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.032929197, 0.017657153, -0.007665964),   // passed_high: the other three, of higher powers
-    vec3(0.23614359, -0.13058884, -0.07147114),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.016634904, 0.018470109, 0.013866931),   // bend_high: 
-    vec3(0.49851844, 0.0006311983, -0.054577872),   // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.049606323, -0.030749634, -0.01205802),  // spread_high: 
-    vec3(1.2460318, -0.2314046, -0.064879),         // path: mean path over that of the refracted direction
-    vec3(0.04211855, 0.02292329, 0.00061380863),    // path_high: 
-    vec3(0.8084004, -1.0369201, -0.056403957),      // theta: scale of the path's distribution
-    vec3(0.32752085, 0.052598123, -0.038988426)     // theta_high: 
+    0.07902597,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.21274194,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.102022186, 0.05346267, -0.00935491, 0.032929197),    // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.017657153, -0.007665964),                             // passed_high: the other two, of higher powers
+    vec4(0.23614359, -0.13058884, -0.07147114, -0.016634904),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.018470109, 0.013866931),                              // bend_high: 
+    vec4(0.49851844, 0.0006311983, -0.054577872, -0.049606323),  // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.030749634, -0.01205802),                             // spread_high: 
+    vec4(1.2460318, -0.2314046, -0.064879, 0.04211855),          // path: mean path over that of the refracted direction
+    vec2(0.02292329, 0.00061380863),                             // path_high: 
+    vec4(0.8084004, -1.0369201, -0.056403957, 0.32752085),       // theta: scale of the path's distribution
+    vec2(0.052598123, -0.038988426)                              // theta_high: 
 );
 
 const OrenNayar lf_walnut = OrenNayar(
@@ -109,8 +109,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

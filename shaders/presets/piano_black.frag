@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Lambert {
@@ -46,18 +46,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.0031546694,                                    // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                    // gain: part of the reflected light that a second facet lets in
-    vec3(-0.009549635, 0.021495357, -0.023831615),   // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.015080304, 0.006754711, -0.0102405865),   // passed_high: the other three, of higher powers
-    vec3(0.003664461, -0.00691487, 0.0020934881),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.0009270547, 0.011122103, -0.008937338),  // bend_high: 
-    vec3(0.75904995, -0.2263068, -0.12822342),       // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.057531953, 0.45303166, -0.40356708),     // spread_high: 
-    vec3(1.009647, -0.020205349, 0.0140322745),      // path: mean path over that of the refracted direction
-    vec3(-0.017401814, 0.037196398, -0.023304224),   // path_high: 
-    vec3(0.020879557, -0.03627545, 0.011439269),     // theta: scale of the path's distribution
-    vec3(-0.084810555, 0.14554596, -0.042862482)     // theta_high: 
+    0.0031546694,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.009549635, 0.021495357, -0.023831615, 0.015080304),   // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.006754711, -0.0102405865),                             // passed_high: the other two, of higher powers
+    vec4(0.003664461, -0.00691487, 0.0020934881, -0.0009270547),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.011122103, -0.008937338),                              // bend_high: 
+    vec4(0.75904995, -0.2263068, -0.12822342, -0.057531953),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.45303166, -0.40356708),                                // spread_high: 
+    vec4(1.009647, -0.020205349, 0.0140322745, -0.017401814),     // path: mean path over that of the refracted direction
+    vec2(0.037196398, -0.023304224),                              // path_high: 
+    vec4(0.020879557, -0.03627545, 0.011439269, -0.084810555),    // theta: scale of the path's distribution
+    vec2(0.14554596, -0.042862482)                                // theta_high: 
 );
 
 const Lambert lf_black = Lambert(
@@ -92,8 +92,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

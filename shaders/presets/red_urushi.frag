@@ -16,16 +16,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Lambert {
@@ -48,18 +48,18 @@ const Coat lf_urushi = Coat(
 );
 
 const Interface lf_urushi_interface = Interface(
-    0.008038055,                                      // tilt: turn of the mean facet towards a grazing direction
-    0.006316437,                                      // gain: part of the reflected light that a second facet lets in
-    vec3(-0.019861361, 0.03569795, -0.021563128),     // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.00021134847, 0.018127924, -0.0131169055),  // passed_high: the other three, of higher powers
-    vec3(0.012738822, -0.02335022, 0.017746096),      // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.013947411, 0.014163258, -0.0065295324),   // bend_high: 
-    vec3(0.7574944, -0.30959716, 0.21663982),         // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.3939808, 0.14949118, -0.03164667),        // spread_high: 
-    vec3(1.028744, -0.061100483, 0.06624964),         // path: mean path over that of the refracted direction
-    vec3(-0.053946853, 0.014147878, 0.0067489147),    // path_high: 
-    vec3(0.06297798, -0.1371728, 0.16691335),         // theta: scale of the path's distribution
-    vec3(-0.22109175, 0.1095863, 0.037178833)         // theta_high: 
+    0.008038055,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.006316437,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.019861361, 0.03569795, -0.021563128, 0.00021134847),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.018127924, -0.0131169055),                             // passed_high: the other two, of higher powers
+    vec4(0.012738822, -0.02335022, 0.017746096, -0.013947411),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.014163258, -0.0065295324),                             // bend_high: 
+    vec4(0.7574944, -0.30959716, 0.21663982, -0.3939808),         // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.14949118, -0.03164667),                                // spread_high: 
+    vec4(1.028744, -0.061100483, 0.06624964, -0.053946853),       // path: mean path over that of the refracted direction
+    vec2(0.014147878, 0.0067489147),                              // path_high: 
+    vec4(0.06297798, -0.1371728, 0.16691335, -0.22109175),        // theta: scale of the path's distribution
+    vec2(0.1095863, 0.037178833)                                  // theta_high: 
 );
 
 const Lambert lf_cinnabar = Lambert(
@@ -94,8 +94,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

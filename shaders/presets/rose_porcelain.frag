@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Lambert {
@@ -46,18 +46,18 @@ const Coat lf_glaze = Coat(
 );
 
 const Interface lf_glaze_interface = Interface(
-    0.0054883463,                                    // tilt: turn of the mean facet towards a grazing direction
-    0.0035753467,                                    // gain: part of the reflected light that a second facet lets in
-    vec3(-0.0151992105, 0.03096597, -0.026210945),   // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(0.008551259, 0.015562363, -0.01404037),     // passed_high: the other three, of higher powers
-    vec3(0.007215311, -0.013483647, 0.008252899),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.0067420173, 0.014364195, -0.009246089),  // bend_high: 
-    vec3(0.73397744, -0.26290506, 0.06938703),       // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.28459442, 0.29432896, -0.17842531),      // spread_high: 
-    vec3(1.0184151, -0.03971079, 0.042724967),       // path: mean path over that of the refracted direction
-    vec3(-0.04176557, 0.027597368, -0.006858945),    // path_high: 
-    vec3(0.03754024, -0.07790418, 0.08442601),       // theta: scale of the path's distribution
-    vec3(-0.15448993, 0.13333824, -0.008031782)      // theta_high: 
+    0.0054883463,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.0035753467,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.0151992105, 0.03096597, -0.026210945, 0.008551259),   // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.015562363, -0.01404037),                               // passed_high: the other two, of higher powers
+    vec4(0.007215311, -0.013483647, 0.008252899, -0.0067420173),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.014364195, -0.009246089),                              // bend_high: 
+    vec4(0.73397744, -0.26290506, 0.06938703, -0.28459442),       // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.29432896, -0.17842531),                                // spread_high: 
+    vec4(1.0184151, -0.03971079, 0.042724967, -0.04176557),       // path: mean path over that of the refracted direction
+    vec2(0.027597368, -0.006858945),                              // path_high: 
+    vec4(0.03754024, -0.07790418, 0.08442601, -0.15448993),       // theta: scale of the path's distribution
+    vec2(0.13333824, -0.008031782)                                // theta_high: 
 );
 
 const Lambert lf_paint = Lambert(
@@ -92,8 +92,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

@@ -16,16 +16,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -49,18 +49,18 @@ const Coat lf_varnish = Coat(
 );
 
 const Interface lf_varnish_interface = Interface(
-    0.019120084,                                       // tilt: turn of the mean facet towards a grazing direction
-    0.02422721,                                        // gain: part of the reflected light that a second facet lets in
-    vec3(-0.0321689, 0.029983805, 0.015549282),        // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(-0.015668225, 0.0009908297, -1.5788479e-05),  // passed_high: the other three, of higher powers
-    vec3(0.04254398, -0.0714967, 0.046763185),         // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.016578522, -0.005647372, 0.0077653723),    // bend_high: 
-    vec3(0.7752975, -0.4359295, 0.25017366),           // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.13368165, -0.13237008, 0.048883975),       // spread_high: 
-    vec3(1.080001, -0.1521383, 0.09882036),            // path: mean path over that of the refracted direction
-    vec3(-0.01597774, -0.025762916, 0.01699841),       // path_high: 
-    vec3(0.19103706, -0.40984368, 0.36370075),         // theta: scale of the path's distribution
-    vec3(-0.20119762, -0.042300656, 0.12330281)        // theta_high: 
+    0.019120084,                                               // tilt: turn of the mean facet towards a grazing direction
+    0.02422721,                                                // gain: part of the reflected light that a second facet lets in
+    vec4(-0.0321689, 0.029983805, 0.015549282, -0.015668225),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.0009908297, -1.5788479e-05),                        // passed_high: the other two, of higher powers
+    vec4(0.04254398, -0.0714967, 0.046763185, -0.016578522),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(-0.005647372, 0.0077653723),                          // bend_high: 
+    vec4(0.7752975, -0.4359295, 0.25017366, -0.13368165),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.13237008, 0.048883975),                            // spread_high: 
+    vec4(1.080001, -0.1521383, 0.09882036, -0.01597774),       // path: mean path over that of the refracted direction
+    vec2(-0.025762916, 0.01699841),                            // path_high: 
+    vec4(0.19103706, -0.40984368, 0.36370075, -0.20119762),    // theta: scale of the path's distribution
+    vec2(-0.042300656, 0.12330281)                             // theta_high: 
 );
 
 const OrenNayar lf_wood = OrenNayar(
@@ -109,8 +109,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

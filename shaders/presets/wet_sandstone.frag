@@ -15,16 +15,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct OrenNayar {
@@ -47,18 +47,18 @@ const Coat lf_water = Coat(
 );
 
 const Interface lf_water_interface = Interface(
-    0.010720346,                                      // tilt: turn of the mean facet towards a grazing direction
-    0.009790741,                                      // gain: part of the reflected light that a second facet lets in
-    vec3(-0.026004575, 0.04301408, -0.014314687),     // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(-0.010176732, 0.016221277, -0.00915219),     // passed_high: the other three, of higher powers
-    vec3(0.013477275, -0.02535109, 0.021349104),      // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.014621947, 0.0060912133, -6.445672e-05),  // bend_high: 
-    vec3(0.62818056, -0.31912512, 0.21570803),        // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.312871, -0.00026713312, 0.06709802),      // spread_high: 
-    vec3(1.0396754, -0.087372005, 0.08643025),        // path: mean path over that of the refracted direction
-    vec3(-0.052160025, -0.005214095, 0.01943636),     // path_high: 
-    vec3(0.06900233, -0.16027227, 0.19247234),        // theta: scale of the path's distribution
-    vec3(-0.19428445, 0.05203541, 0.05342995)         // theta_high: 
+    0.010720346,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.009790741,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.026004575, 0.04301408, -0.014314687, -0.010176732),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.016221277, -0.00915219),                              // passed_high: the other two, of higher powers
+    vec4(0.013477275, -0.02535109, 0.021349104, -0.014621947),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(0.0060912133, -6.445672e-05),                           // bend_high: 
+    vec4(0.62818056, -0.31912512, 0.21570803, -0.312871),        // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.00026713312, 0.06709802),                            // spread_high: 
+    vec4(1.0396754, -0.087372005, 0.08643025, -0.052160025),     // path: mean path over that of the refracted direction
+    vec2(-0.005214095, 0.01943636),                              // path_high: 
+    vec4(0.06900233, -0.16027227, 0.19247234, -0.19428445),      // theta: scale of the path's distribution
+    vec2(0.05203541, 0.05342995)                                 // theta_high: 
 );
 
 const OrenNayar lf_stone = OrenNayar(
@@ -107,8 +107,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

@@ -48,9 +48,7 @@ def shade(prepared: Any, wi: Any, wo: Any, weight: Any, place: Any = None, *, fo
     """
     if getattr(prepared, "of_curves", False):  # they hold the channels together
         return jax.vmap(lambda *pixel: _pixel(form, prepared, *pixel), out_axes=1)(wi, wo, jnp.moveaxis(weight, 0, -1), place)
-    whole = lambda value: getattr(value, "colourless", False)  # noqa: E731
-    colour = lambda value: 0 if not whole(value) and jnp.shape(value) == (3,) else None  # noqa: E731
-    colours = jax.tree.map(colour, prepared, is_leaf=whole)
+    colours = jax.tree.map(lambda value: 0 if jnp.shape(value) == (3,) else None, prepared)
 
     def channel(prepared: Any, weight: Any) -> Any:
         return jax.vmap(lambda *pixel: _pixel(form, prepared, *pixel))(wi, wo, weight, place)

@@ -17,16 +17,16 @@ struct Coat {
 struct Interface {
     float tilt;        // turn of the mean facet towards a grazing direction
     float gain;        // part of the reflected light that a second facet lets in
-    vec3 passed;       // energy that passes, beyond the closed form: three coefficients
-    vec3 passed_high;  // the other three, of higher powers
-    vec3 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
-    vec3 bend_high;    // 
-    vec3 spread;       // width of a lobe seen through it, over that of the facets
-    vec3 spread_high;  // 
-    vec3 path;         // mean path over that of the refracted direction
-    vec3 path_high;    // 
-    vec3 theta;        // scale of the path's distribution
-    vec3 theta_high;   // 
+    vec4 passed;       // energy that passes, beyond the closed form: four coefficients
+    vec2 passed_high;  // the other two, of higher powers
+    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec2 bend_high;    // 
+    vec4 spread;       // width of a lobe seen through it, over that of the facets
+    vec2 spread_high;  // 
+    vec4 path;         // mean path over that of the refracted direction
+    vec2 path_high;    // 
+    vec4 theta;        // scale of the path's distribution
+    vec2 theta_high;   // 
 };
 
 struct Curve {
@@ -72,33 +72,33 @@ const Coat lf_primer = Coat(
 );
 
 const Interface lf_coat_top = Interface(
-    0.024779005,                                         // tilt: turn of the mean facet towards a grazing direction
-    0.036722906,                                         // gain: part of the reflected light that a second facet lets in
-    vec3(-0.035054997, 0.020641431, 0.025624495),        // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(-0.0064411927, -0.0061165085, -0.00076546334),  // passed_high: the other three, of higher powers
-    vec3(0.06184196, -0.096420236, 0.046584222),         // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.0025666347, -0.009934818, 0.005613242),      // bend_high: 
-    vec3(0.7778974, -0.42731008, 0.14473301),            // spread: width of a lobe seen through it, over that of the facets
-    vec3(0.0003119707, -0.11521681, -0.009224892),       // spread_high: 
-    vec3(1.1060052, -0.18565032, 0.08457264),            // path: mean path over that of the refracted direction
-    vec3(0.017342567, -0.025979936, 0.0063171387),       // path_high: 
-    vec3(0.26631966, -0.53991795, 0.37586775),           // theta: scale of the path's distribution
-    vec3(-0.10775492, -0.07368938, 0.10674948)           // theta_high: 
+    0.024779005,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.035054997, 0.020641431, 0.025624495, -0.0064411927),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(-0.0061165085, -0.00076546334),                          // passed_high: the other two, of higher powers
+    vec4(0.06184196, -0.096420236, 0.046584222, -0.0025666347),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(-0.009934818, 0.005613242),                              // bend_high: 
+    vec4(0.7778974, -0.42731008, 0.14473301, 0.0003119707),       // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.11521681, -0.009224892),                              // spread_high: 
+    vec4(1.1060052, -0.18565032, 0.08457264, 0.017342567),        // path: mean path over that of the refracted direction
+    vec2(-0.025979936, 0.0063171387),                             // path_high: 
+    vec4(0.26631966, -0.53991795, 0.37586775, -0.10775492),       // theta: scale of the path's distribution
+    vec2(-0.07368938, 0.10674948)                                 // theta_high: 
 );
 
 const Interface lf_coat_both = Interface(
-    0.024779005,                                         // tilt: turn of the mean facet towards a grazing direction
-    0.036722906,                                         // gain: part of the reflected light that a second facet lets in
-    vec3(-0.035054997, 0.020641431, 0.025624495),        // passed: energy that passes, beyond the closed form: three coefficients
-    vec3(-0.0064411927, -0.0061165085, -0.00076546334),  // passed_high: the other three, of higher powers
-    vec3(-0.09620379, -0.08588411, 0.040890552),         // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec3(-0.0041511953, -0.010286503, 0.0039637834),     // bend_high: 
-    vec3(0.09954319, -0.03336258, 0.012172839),          // spread: width of a lobe seen through it, over that of the facets
-    vec3(-0.000896357, -0.011329744, -0.0025816858),     // spread_high: 
-    vec3(1.0546784, -0.071492076, 0.017656565),          // path: mean path over that of the refracted direction
-    vec3(0.017326593, -0.010948837, -0.0020993948),      // path_high: 
-    vec3(0.08373786, -0.15304142, 0.076810524),          // theta: scale of the path's distribution
-    vec3(0.021043582, -0.03042803, 0.017840791)          // theta_high: 
+    0.024779005,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.035054997, 0.020641431, 0.025624495, -0.0064411927),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(-0.0061165085, -0.00076546334),                          // passed_high: the other two, of higher powers
+    vec4(-0.09620379, -0.08588411, 0.040890552, -0.0041511953),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
+    vec2(-0.010286503, 0.0039637834),                             // bend_high: 
+    vec4(0.09954319, -0.03336258, 0.012172839, -0.000896357),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.011329744, -0.0025816858),                            // spread_high: 
+    vec4(1.0546784, -0.071492076, 0.017656565, 0.017326593),      // path: mean path over that of the refracted direction
+    vec2(-0.010948837, -0.0020993948),                            // path_high: 
+    vec4(0.08373786, -0.15304142, 0.076810524, 0.021043582),      // theta: scale of the path's distribution
+    vec2(-0.03042803, 0.017840791)                                // theta_high: 
 );
 
 const Curve lf_coat_passed = Curve(
@@ -222,8 +222,8 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // A polynomial of six coefficients at s.
-float lf_curve(vec3 low, vec3 high, float s) {
-    return low.x + s * (low.y + s * (low.z + s * (high.x + s * (high.y + s * high.z))));
+float lf_curve(vec4 low, vec2 high, float s) {
+    return low.x + s * (low.y + s * (low.z + s * (low.w + s * (high.x + s * high.y))));
 }
 
 // Follow one direction through the coat's rough top.

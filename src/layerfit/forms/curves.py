@@ -16,7 +16,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from .._chunk import chunk, clip, member, safe_divide, safe_power, safe_sqrt, struct, where
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Scalar, Vec2, Vec4
 from ..optics.interface import facet_tilt, rough_transmittance, second_facet
 from . import tables
 from .tables import Kind
@@ -55,19 +55,16 @@ class Interface:
 
     tilt: Scalar = member("turn of the mean facet towards a grazing direction")
     gain: Scalar = member("part of the reflected light that a second facet lets in")
-    passed: Vec3 = member("energy that passes, beyond the closed form: three coefficients")
-    passed_high: Vec3 = member("the other three, of higher powers")
-    bend: Vec3 = member("sine of the refracted light over that at a smooth interface, beyond 1")
-    bend_high: Vec3 = member("")
-    spread: Vec3 = member("width of a lobe seen through it, over that of the facets")
-    spread_high: Vec3 = member("")
-    path: Vec3 = member("mean path over that of the refracted direction")
-    path_high: Vec3 = member("")
-    theta: Vec3 = member("scale of the path's distribution")
-    theta_high: Vec3 = member("")
-
-    colourless = True
-    """Its vectors are coefficients, and no channels."""
+    passed: Vec4 = member("energy that passes, beyond the closed form: four coefficients")
+    passed_high: Vec2 = member("the other two, of higher powers")
+    bend: Vec4 = member("sine of the refracted light over that at a smooth interface, beyond 1")
+    bend_high: Vec2 = member("")
+    spread: Vec4 = member("width of a lobe seen through it, over that of the facets")
+    spread_high: Vec2 = member("")
+    path: Vec4 = member("mean path over that of the refracted direction")
+    path_high: Vec2 = member("")
+    theta: Vec4 = member("scale of the path's distribution")
+    theta_high: Vec2 = member("")
 
 
 @struct
@@ -104,9 +101,9 @@ def _scale() -> tuple[float, float]:
 
 
 @chunk
-def curve(low: Vec3, high: Vec3, s: Scalar) -> Scalar:
+def curve(low: Vec4, high: Vec2, s: Scalar) -> Scalar:
     """A polynomial of six coefficients at s."""
-    return low[0] + s * (low[1] + s * (low[2] + s * (high[0] + s * (high[1] + s * high[2]))))
+    return low[0] + s * (low[1] + s * (low[2] + s * (low[3] + s * (high[0] + s * high[1]))))
 
 
 def power(width: Any) -> Any:
@@ -156,7 +153,7 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     longer = path * z / _below(mu, sin2, rx / eta)
     hidden = dT * clip((eta - 1.0) / MASKED, 0.0, 1.0)
     rows = (hidden, bend, spread, longer, theta)
-    curves = [half for row in rows for half in jnp.split(polynomial(row), 2)]
+    curves = [part for row in rows for part in parts(polynomial(row))]
     rough = where(alpha > 1.0, 1.0, alpha)  # not min: at 1 its derivative is half of either side's
     tilt, gain = facet_tilt(rough), second_facet(rough)
     closed = jax.vmap(lambda c: rough_transmittance(c, eta, gain))(jnp.sqrt(mu * mu + tilt * sin2))
@@ -207,6 +204,11 @@ def hemispherical(values: Float[Array, " m"]) -> Scalar:
 def polynomial(values: Float[Array, " m"]) -> Float[Array, " c"]:
     """Coefficients of the curve through values at the cosines of the tables above: least squares."""
     return jnp.asarray(_above()[0], values.dtype) @ values
+
+
+def parts(coefficients: Float[Array, " c"]) -> list[Float[Array, " p"]]:
+    """Coefficients as an `Interface` holds them: no three are one vector, which would be a colour."""
+    return jnp.split(coefficients, [4])
 
 
 @chunk

@@ -21,7 +21,20 @@ from ..layers import Coat
 from ..optics.directions import along, direction
 from . import one_coat, tables
 from .bounces import Curve, amount, bounces, cells_of
-from .curves import Interface, Nodes, absorbed, added, bake, depth, diffuse_return, gauss, polynomial, presence, spread_root
+from .curves import (
+    Interface,
+    Nodes,
+    absorbed,
+    added,
+    bake,
+    depth,
+    diffuse_return,
+    gauss,
+    parts,
+    polynomial,
+    presence,
+    spread_root,
+)
 from .one_coat import Crossing, between, direct, lean, pass_interface, split
 from .tables import Kind
 
@@ -209,7 +222,7 @@ def _composed(first: _Top, way: tuple[Any, Crossing, Crossing, Crossing]) -> Int
     rows = {"bend": bend, "spread": x.a, "path": x.path * x.w[:, 2], "theta": x.theta}
     halves: dict[str, Any] = {}
     for name, row in rows.items():
-        halves[name], halves[f"{name}_high"] = jnp.split(polynomial(row), 2)
+        halves[name], halves[f"{name}_high"] = parts(polynomial(row))
     return dataclasses.replace(first.interface, **halves)
 
 
