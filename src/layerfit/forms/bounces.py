@@ -20,7 +20,7 @@ from ..layers import Coat
 from ..optics.fresnel import fresnel_dielectric
 from ..optics.microfacet import ggx_lambda
 from ..surfaces.microfacet import Conductor
-from .curves import CELLS, Nodes, absorbed, added, diffuse_return, hemispherical, polynomial, presence
+from .curves import CELLS, Nodes, absorbed, added, diffuse_return, hemispherical, interpolated, polynomial, presence
 
 RINGS, SPOKES = 8, 4
 """Facets that stand for all that light from one direction meets: Gauss over its cone, even over half a turn."""
@@ -54,7 +54,7 @@ def wider(alpha: Scalar, coat_alpha: Scalar) -> Scalar:
 
 
 def bounces(nodes: Nodes, alpha: Scalar, coat: Coat, base: Conductor | Coat) -> tuple[Curve, Curve]:
-    """Weight of a wider lobe, and fourth root of the rest, over the cosine above; for each colour.
+    """Weight of a wider lobe, as a factor of light and of view, and fourth root of the rest, over the cosine above; for each colour.
 
     `alpha` is the width of the coat's GGX facets; `coat` and `base` have relative indices.
     """
@@ -65,8 +65,6 @@ def bounces(nodes: Nodes, alpha: Scalar, coat: Coat, base: Conductor | Coat) -> 
 
 
 def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, tau: Scalar | None) -> tuple[Curve, Curve]:
-    # Facets that are met once lose light. Out of diffuse light comes what comes in, over eta^2: of 1 - R that part, the rest is lost.
-    passes = hemispherical(nodes.T) / (eta * eta * (1.0 - diffuse_return(nodes, None)))
     edge = safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta
     cells = cells_of(edge)
     aside = 0.5 * nodes.spread / nodes.z
@@ -87,7 +85,8 @@ def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, t
     energy = weight[up] * jax.vmap(jax.vmap(base.reflectance))(c[up]) * ((1.0 + sight) / (1.0 + shadow))
     back = into[up] @ nodes.R
     once = 1.0 if tau is None else jnp.exp(-safe_divide(tau, z[up]))
-    leaves = jnp.sum(energy * once * passes * (1.0 - back), -1)
+    out = energy * once * (into[up] @ _exits(nodes, cells, eta))
+    leaves = jnp.sum(out, -1)
     returns = energy * once * once * back
     inside = returns * safe_sqrt(jnp.minimum((1.0 - back) / (1.0 - nodes.R[-1]), 1.0))
 
@@ -103,10 +102,33 @@ def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, t
     rest = jnp.maximum(chain[n:] @ total - lobe, 0.0)
     kept = 1.0 if tau is None else jax.vmap(lambda path, theta: absorbed(path, theta, tau))(nodes.path, nodes.theta)
     norm = hemispherical(nodes.T * kept * rest) / (eta * eta)
-    weight = lobe / jnp.maximum(base.f0 * leaves[m:], 1e-9)
+    factor = _factors(lobe / jnp.maximum(base.f0 * leaves[m:], 1e-9), nodes, z[m:-n], out[m:])
     # Once more the root: over a smooth base the rest falls a hundredfold from grazing to normal light, too far for a polynomial.
     root = safe_sqrt(rest / jnp.sqrt(jnp.maximum(norm, 1e-12)))
-    return Curve(*polynomial(weight)), Curve(*polynomial(root))
+    return Curve(*polynomial(factor)), Curve(*polynomial(root))
+
+
+def _exits(nodes: Nodes, cells: Float[Array, " k"], eta: Scalar) -> Float[Array, " k"]:
+    """Energy that leaves of light from below at the cosines of the cells: what is not reflected, less what facets that are met once lose.
+
+    They hide the more, the lower light grazes, as 1 / z; and in all as much as makes out of diffuse light come what comes in, over eta^2.
+    """
+    lost = 1.0 - diffuse_return(nodes, None) - hemispherical(nodes.T) / (eta * eta)
+    return jnp.maximum(1.0 - nodes.R - 0.5 * lost / cells, 0.0)
+
+
+def _factors(
+    weight: Float[Array, " m"], nodes: Nodes, z: Float[Array, "m s"], leaves: Float[Array, "m s"]
+) -> Float[Array, " m"]:
+    """The weight of a lobe as the product of one factor a direction, which over all views is that weight for each light of the nodes.
+
+    `leaves` is the energy of the lobe that leaves from cosines z below.
+    """
+    share = leaves / jnp.maximum(jnp.sum(leaves, -1, keepdims=True), 1e-9)
+    factor = safe_sqrt(weight)
+    for _ in range(3):
+        factor = safe_sqrt(weight * safe_divide(factor, jnp.sum(share * interpolated(z, nodes.z, factor), -1)))
+    return factor
 
 
 def cells_of(edge: Scalar) -> Float[Array, " k"]:

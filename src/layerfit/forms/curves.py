@@ -196,6 +196,13 @@ def gauss(edge: Scalar) -> tuple[Float[Array, " q"], Float[Array, " q"]]:
     return jnp.concatenate([edge * x, edge + (1.0 - edge) * x]), jnp.concatenate([edge * dx, (1.0 - edge) * dx])
 
 
+def interpolated(x: Float[Array, "*n"], known: Float[Array, " k"], values: Float[Array, " k"]) -> Float[Array, "*n"]:
+    """Straight lines between values at growing arguments, and level beyond them."""
+    # Not `jnp.interp`, which looks places up: a page computes this too, and has no step for that.
+    passed = clip(safe_divide(x[..., None] - known[:-1], jnp.diff(known)), 0.0, 1.0)
+    return values[0] + passed @ jnp.diff(values)
+
+
 def hemispherical(values: Float[Array, " m"]) -> Scalar:
     """2 int f mu dmu of values at the cosines of the tables above."""
     return jnp.asarray(_above()[1], values.dtype) @ values

@@ -52,7 +52,7 @@ class Prepared:
     returned: Colour | None
     """Part of diffuse light that returns from the coat, for a diffuse base."""
     again: Curve | None
-    """Of a metal: weight of the wider lobe of light that met it twice."""
+    """Of a metal: weight of the wider lobe of light that met it twice, as a factor of light and of view."""
     rest: Curve | None
     """Of a metal: fourth root of the light that is left."""
     across: Interface | None = None
@@ -145,7 +145,7 @@ def below(i: Crossing, o: Crossing, prepared: Prepared) -> Colour:
     wide, left = prepared.again, prepared.rest
     assert wide is not None
     assert left is not None
-    again = 0.5 * F * (amount(wide, i.s) + amount(wide, o.s))
+    again = F * (amount(wide, i.s) * amount(wide, o.s))
     lobes = rise * lobe(i, o, h[-1], own) + again * lobe(i, o, h[-1], wider(own, top))
     root = amount(left, i.s) * amount(left, o.s)
     rest = root * root * ahead(i, o, coat.eta, even_width(base.width))

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._chunk import chunk, clip, dot, safe_divide, safe_sqrt, struct, where
+from .._chunk import chunk, clip, dot, safe_sqrt, struct, where
 from .._types import Colour, Direction, Scalar
 from ..layers import Coat
 from ..optics.directions import along, direction
@@ -30,6 +30,7 @@ from .curves import (
     depth,
     diffuse_return,
     gauss,
+    interpolated,
     parts,
     polynomial,
     presence,
@@ -61,7 +62,7 @@ class Prepared:
     passed: Curve
     """Energy that the inner coat's top passes of what the outer's did, what comes back to it included."""
     inner_again: Curve
-    """Of the inner coat's top: weight of the wider lobe of light that met it twice."""
+    """Of the inner coat's top: weight of the wider lobe of light that met it twice, as a factor of light and of view."""
     inner_rest: Curve
     """Of the inner coat's top: fourth root of the light that is left."""
     base: Any
@@ -96,10 +97,7 @@ class _Top:
         known = jnp.concatenate([cells_of(edge), cosines])
         R = jnp.concatenate([jnp.asarray(self.nodes.R), self.nodes.weights / jnp.maximum(2.0 * cosines * widths, 1e-12)])
         order = jnp.argsort(known)
-        known, R = known[order], R[order]
-        # Not `jnp.interp`, which looks nodes up: a page computes this too, and has no step for that.
-        passed = clip(safe_divide(z[:, None] - known[:-1], jnp.diff(known)), 0.0, 1.0)
-        return R[0] + passed @ jnp.diff(R)
+        return interpolated(z, known[order], R[order])
 
 
 def prepare(outer: Coat, inner: Coat, base: Any, kind: Kind) -> Prepared:

@@ -35,7 +35,7 @@ class PreciseWay:
     path: Scalar = member("mean path, in thicknesses")
     theta: Scalar = member("scale of the path's distribution")
     rest: Colour = member("fourth root of what leaves of the light that goes to and fro")
-    again: Colour = member("half the weight of the lobe of light that met the metal twice")
+    again: Colour = member("weight of the lobe of light that met the metal twice, as a factor of light and of view")
 
 
 @struct
@@ -52,7 +52,7 @@ class PreciseMetal(Compact):
     rest: Polynomial
     """Of `grazing`: fourth root of the light that is left, and what the energy is beyond the closed form."""
     again: Polynomial
-    """Of `grazing`: half the weight of the second lobe, and the spread of the tail."""
+    """Of `grazing`: factor of the weight of the second lobe, and the spread of the tail."""
     absorbing: Polynomial | None
     """Of theta: optical depth that counts."""
     unspread: Polynomial | None
@@ -83,7 +83,7 @@ class PreciseMetal(Compact):
         between = metal_between(self.own, self.widths, self.least, i, o, lean2)
         lobes = metal_lobes(self.own, self.variance, self.widths, self.alpha2, i, o, between)
         F = self.reflectance(between.h2)
-        again = F * (i.again + o.again) * lobes[1]
+        again = F * (i.again * o.again) * lobes[1]
         rise = 1.0 + self.rise * between.share
         back = i.bend * o.bend * (lean2 - i.sin2 - o.sin2)
         root = i.rest * o.rest
@@ -204,7 +204,7 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
             z,
             jnp.stack([jnp.minimum(bend, 1.0), power(crossing.a), crossing.path * z, crossing.theta]),
             jnp.hstack([amount(rest, s), beyond]),
-            jnp.hstack([0.5 * amount(again, s), one_coat.TAIL * crossing.a * crossing.a]),
+            jnp.hstack([amount(again, s), one_coat.TAIL * crossing.a * crossing.a]),
         )
 
     NoW = cosines()
