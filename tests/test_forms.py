@@ -28,6 +28,7 @@ from helpers import (
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.layers import Coat
+from layerfit.optics.fresnel import fresnel_dielectric, rarer_cosine
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Lambert, OrenNayar
 from layerfit.surfaces.diffuse import oren_nayar_full, oren_nayar_qualitative
@@ -287,6 +288,41 @@ def test_a_thicker_coat_is_darker():
     ]
     for thin, thick in itertools.pairwise(values):
         assert np.all(np.asarray(thick) <= np.asarray(thin))
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize(("outer", "inner"), [(1.5, 3.0), (1.5, 1.3), (3.0, 1.0), (1.0, 1.5)])
+def test_smooth_coats_return_what_a_sum_over_all_directions_does(outer, inner, dtype):
+    """By Fresnel's formula alone. Total reflection begins to air and to the outer coat, each at an angle of its own."""
+    albedo, count = 0.8, 200_000
+    over_cosines = jax.vmap(fresnel_dielectric, (0, None))
+    coats = Coat(alpha=1e-3, eta=outer), Coat(name="inner", alpha=1e-3, eta=inner)
+    stack = Stack(coats, Lambert(albedo=albedo), Corrected(rough_interface=False)).astype(dtype)
+    cosine = (np.arange(count) + 0.5) / count
+    p2 = (inner * inner) * (1.0 - cosine * cosine)
+    above = np.sqrt(np.maximum(1.0 - p2 / (outer * outer), 0.0))
+    F = [over_cosines(jnp.asarray(c), n) for c, n in ((above, 1.0 / outer), (cosine, outer / inner))]
+    upper, lower = (np.where(p2 < n * n, f, 1.0) for n, f in zip((1.0, outer), F, strict=True))
+    escapes = (1.0 - upper) * (1.0 - lower) / np.maximum(1.0 - upper * lower, 1e-12)
+    wanted = 1.0 / (1.0 - albedo * (1.0 - np.mean(2.0 * cosine * escapes)))
+    assert float(stack.prepare().returned) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_light_that_grazes_below_a_denser_coat_has_its_digits():
+    """At the edge of total reflection a cosine in the denser medium has none left."""
+    coats = Coat(alpha=1e-3, eta=3.0, tau=0.0), Coat(name="inner", alpha=1.0, eta=1.0, tau=0.0)
+    stack = Stack(coats, Conductor(alpha=1e-3, eta=10.0, k=15.0), Corrected()).astype(np.float32)
+    wi, wo = (np.float32(direction(theta, 20.0)) for theta in (70.0, 89.99))
+    double = jax.tree.map(lambda x: np.asarray(x, float), (stack, wi, wo))
+    assert value_at(stack, wi, wo, np.float32) == pytest.approx(value_at(*double, np.float64), rel=1e-5)
+
+
+@pytest.mark.parametrize("more", [{}, {"fresnel": "schlick"}, {"fresnel": "lazanyi"}, {"film_nm": 300.0, "film_eta": 2.1}])
+@pytest.mark.parametrize("above", [1.0, 2.0])
+def test_what_passes_is_the_same_by_either_cosine(more, above):
+    coat = jax.tree.map(jnp.float64, Coat(alpha=0.1, eta=1.5, **more)).below(jnp.float64(above))
+    for c in np.linspace(0.05, 1.0, 9):
+        np.testing.assert_allclose(coat.passes(rarer_cosine(c, coat.eta)), coat.transmittance(c), rtol=1e-12, atol=1e-15)
 
 
 def test_equal_widths_are_isotropic():

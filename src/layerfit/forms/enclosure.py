@@ -1,7 +1,9 @@
 """Light between a diffuse or scattering layer and the coats over it: what comes back, by quadrature over its directions, once a material."""
 
+import itertools
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import partial, reduce
+from operator import add
 from typing import Any
 
 import jax
@@ -60,22 +62,20 @@ def _over_directions(
 ) -> Sequence[Colour]:
     """2 int f(S, mu) mu dmu over the directions in the innermost medium, mu from 0 to 1; S is what passes up and out."""
     n = interfaces[-1].n
-    n_above = interfaces[-2].n if len(interfaces) > 1 else jnp.ones_like(n)
-    # Directions are counted by their cosine u^3 in the rarer of the two media: there the integrand is smooth, at any
-    # width, and the cube gathers nodes where short paths through a thin medium make it steep.
-    rare = where(n < n_above, n, n_above)  # not min: at matching indices its derivative is half of either side's
-    cone = (rare / n) ** 2
+    edges = _edges(interfaces)
 
     def at(u: Scalar) -> Sequence[Colour]:
-        u2 = u * u
-        u3 = u2 * u
-        jacobian = 6.0 * u2 * u3
-        p2 = (1.0 - u3) * (1.0 + u3) * rare * rare
-        S = _passed_up(coats, interfaces, p2)
-        cosine = safe_sqrt((rare * u3) ** 2 + (n - rare) * (n + rare)) / n
-        outside = u3 * safe_sqrt(1.0 - cone)
-        within, beyond = f(S, cosine), f(jnp.zeros_like(S), outside)
-        return [jacobian * (cone * w + (1.0 - cone) * b) for w, b in zip(within, beyond, strict=True)]
+        # Between two edges directions are counted by u^3, the root of how far n sin is from the upper one: in it the integrand is
+        # smooth, at any width, and the cube gathers nodes where short paths through a thin medium make it steep.
+        u3 = u * u * u
+        total: list[Any] = []
+        for lower, upper in itertools.pairwise((jnp.zeros_like(n), *edges, n)):
+            span = (upper - lower) * (upper + lower)
+            along_normal = partial(_along_normal, upper, span * u3 * u3)
+            cosine = safe_sqrt(along_normal(n)) / n
+            S = 0.0 * cosine if upper is n else _passed_up(coats, interfaces, along_normal)
+            total.append([6.0 * u * u * u3 * (span / (n * n)) * value for value in f(S, cosine)])
+        return [reduce(add, values) for values in zip(*total, strict=True)]
 
     def accumulate(total: Sequence[Colour], node: tuple[Scalar, Scalar]) -> tuple[Sequence[Colour], None]:
         u, weight = node
@@ -87,24 +87,39 @@ def _over_directions(
     return jax.lax.scan(accumulate, zeros, (jnp.asarray(u), jnp.asarray(weight)))[0]
 
 
+def _edges(interfaces: list[Interface]) -> list[Scalar]:
+    """n sin of the edges of total reflection, which light from below meets on its way to air and to every coat but its own; ascending."""
+    least, edges = interfaces[-1].n, []
+    for n in [*(interface.n for interface in interfaces[-2::-1]), jnp.ones_like(least)]:
+        least = where(least < n, least, n)  # not min: at matching indices its derivative is half of either side's
+        edges.insert(0, least)
+    return edges
+
+
+def _along_normal(edge: Scalar, below: Scalar, n: Scalar) -> Scalar:
+    """(n cos)^2 in a medium of index n, of light whose (n sin)^2 is so much `below` that of an edge."""
+    return (n - edge) * (n + edge) + below
+
+
 def _lost(tau: Colour | None, cosine: Scalar) -> Any:
     """Absorbed on the way up and down again."""
     return 0.0 if tau is None else -jnp.expm1(-tau * safe_divide(2.0, cosine))
 
 
-def _passed_up(coats: list[Coat], interfaces: list[Interface], p2: Scalar) -> Colour:
-    """Part of the light from below that leaves the stack; p2 = (n sin)^2, the same in every medium."""
+def _passed_up(coats: list[Coat], interfaces: list[Interface], along_normal: Callable[[Scalar], Scalar]) -> Colour:
+    """Part of the light from below that leaves the stack; `along_normal` is (n cos)^2 of it in a medium of index n."""
     S: Any = 1.0
     n_above = jnp.ones_like(interfaces[0].n)
     for depth, (coat, interface) in enumerate(zip(coats, interfaces, strict=True)):
-        cosine2 = 1.0 - p2 / (n_above * n_above)
-        w = jnp.stack([safe_sqrt(p2) / n_above, jnp.zeros_like(p2), safe_sqrt(cosine2)])
-        c = where(coat.eta >= 1.0, facet_cosine(w, interface.tilt), w[-1])
-        T = where(cosine2 > 0.0, with_second_facet(coat.transmittance(c), interface.gain), 0.0)
+        above = along_normal(n_above)
+        z, z_below = safe_sqrt(above) / n_above, safe_sqrt(along_normal(interface.n)) / interface.n
+        w = jnp.stack([safe_sqrt((1.0 - z) * (1.0 + z)), jnp.zeros_like(z), z])
+        c = where(coat.eta >= 1.0, facet_cosine(w, interface.tilt), z_below)
+        T = where(above > 0.0, with_second_facet(coat.passes(c), interface.gain), 0.0)
         if depth == 0:
             S = T
         else:
-            back = (1.0 - S) * remains(coats[depth - 1].extinction, safe_divide(2.0, w[-1]))
+            back = (1.0 - S) * remains(coats[depth - 1].extinction, safe_divide(2.0, z))
             S = T * (1.0 - back) / jnp.maximum(1.0 - (1.0 - T) * back, 1e-6)
         n_above = interface.n
     return S

@@ -103,7 +103,11 @@ class Coat(Filmed, Clear, Microfacets):
         """Part of the light that passes a facet at the cosine `c`, and its film."""
         if self.film_0 is None:
             return super().transmittance(c)
-        c = rarer_cosine(c, self.eta)
+        return self.passes(rarer_cosine(c, self.eta))
+
+    def passes(self, c: Scalar) -> Colour:
+        if self.film_0 is None:
+            return super().passes(c)
         return film_passes(c, film_on_coat(self, c))
 
 

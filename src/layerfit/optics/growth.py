@@ -9,10 +9,9 @@ import jax.numpy as jnp
 from .._chunk import chunk, clip, safe_divide, safe_sqrt, where
 from .._types import Scalar
 
-
-def _power(x: Scalar, exponent: Scalar) -> Scalar:
-    """x ** exponent for x >= 0 where the exponent is fitted too; 0, and no derivative in x, at 0."""
-    return jnp.exp(exponent * jnp.log(jnp.maximum(x, 1e-30)))
+COVERED = 7.0
+"""Logarithm of the power of time from which on nothing is left to cover: exp(-exp(7)) is 0 in every precision. The power itself would
+overflow, and its derivative not be a number."""
 
 
 def softplus(x: Scalar) -> Scalar:
@@ -29,7 +28,9 @@ def exposed_part(sky: Scalar, exposure: Scalar) -> Scalar:
 @chunk
 def coverage(t: Scalar, t0: Scalar, p: Scalar) -> Scalar:
     """Threshold theta in [0, 1) at the time t: growth from random nuclei (Avrami 1939), 1 - 1/e at the onset t0."""
-    return -jnp.expm1(-_power(t / t0, p))
+    # At 0 a power below 1 has no derivative.
+    logarithm = p * jnp.log(jnp.maximum(t / t0, 1e-30))
+    return -jnp.expm1(-jnp.exp(jnp.minimum(logarithm, COVERED)))
 
 
 @chunk

@@ -114,8 +114,12 @@ class Clear(Facet):
         return fresnel_dielectric(c, self.eta)
 
     def approximate(self, c: Colour) -> Colour:
-        """That of the rarer side; 0 where the indices match and there is no boundary."""
-        return where(self.eta == 1.0, 0.0, super().approximate(rarer_cosine(c, self.eta)))
+        """That of the rarer side."""
+        return self._approximate_rarer(rarer_cosine(c, self.eta))
+
+    def _approximate_rarer(self, c: Colour) -> Colour:
+        """By the cosine on the rarer side; 0 where the indices match and there is no boundary."""
+        return where(self.eta == 1.0, 0.0, super().approximate(c))
 
     def fitted(self) -> Self:
         """The same with the constants of its approximation, for the relative index that it has."""
@@ -128,3 +132,9 @@ class Clear(Facet):
     def transmittance(self, c: Scalar) -> Colour:
         """Part of the light that passes a facet at the cosine `c`."""
         return transmittance_dielectric(c, self.eta) if self.fresnel == "exact" else 1.0 - self.reflectance(c)
+
+    def passes(self, c: Scalar) -> Colour:
+        """The same by the cosine on the rarer side: that on the denser one has lost its digits where total reflection begins."""
+        if self.fresnel == "exact":
+            return transmittance_dielectric(c, where(self.eta >= 1.0, self.eta, 1.0 / self.eta))
+        return 1.0 - self._approximate_rarer(c)
