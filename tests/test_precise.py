@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from helpers import COPPER, STACKS, brdf_rows, hemisphere, varnish
+from helpers import COPPER, STACKS, brdf_rows, direction, hemisphere, varnish
 from layerfit.errors import InputError
 from layerfit.forms import corrected, curves, one_coat, precise, tables
 from layerfit.forms.one_coat import Crossing, Prepared
@@ -411,3 +411,15 @@ def test_its_interface_is_kept_in_a_preset_and_checked():
         stack_of({"model": "corrected", "interface": "multi", "layers": [{"type": "coat"}], "base": METAL}, "here")
     with pytest.raises(InputError, match="not for this material: there is no coat"):
         stack_of({"model": "precise", "base": METAL}, "here")
+
+
+@pytest.mark.parametrize("indices", [(1.000002,), (1.0, 1.0), (1.5, 1.0), (1.0, 1.000002)])
+def test_grazing_light_near_index_1_has_its_digits(indices):
+    """Both the squared cosine and what refraction adds to it are some 1e-6 there: as a sine of nearly 1 neither has digits."""
+    coats = tuple(Coat(name=f"coat {k}", alpha=0.1, eta=n, tau=0.02) for k, n in enumerate(indices))
+    stack = Stack(coats, Conductor(alpha=0.2, eta=0.2, k=3.5), Precise()).astype(np.float32)
+    wi, wo = (np.float32([direction(*angles)]) for angles in ((89.9, 20.0), (35.0, 170.0)))
+    double = jax.tree.map(lambda x: np.asarray(x, float), (stack, wi, wo))
+    with jax.enable_x64(False):
+        found = np.asarray(brdf_rows(stack, wi, wo))
+    np.testing.assert_allclose(found, brdf_rows(*double), rtol=5e-5)

@@ -165,8 +165,32 @@ def test_what_jumps_or_turns_is_told():
 def test_what_is_not_finite_is_an_infinite_error():
     broken, whole = np.array([[1.0, np.nan]]), np.ones((1, 2))
     np.testing.assert_array_equal(measure.value_error(broken, whole), [[0.0, np.inf]])
-    assert sweep.beyond(broken, whole) == 1
-    assert sweep.beyond(np.array([[1.0 + 2e-4, 5e-7]]), np.array([[1.0, 0.0]])) == 1
+    nothing = np.zeros((1, 2))
+    assert sweep.beyond(broken, whole, nothing) == 1
+    assert sweep.beyond(broken, whole, nothing + 1.0) == 1
+    off, right = np.array([[1.0 + 2e-4, 5e-7]]), np.array([[1.0, 0.0]])
+    assert sweep.beyond(off, right, nothing) == 1
+    assert sweep.beyond(off, right, nothing + 3e-4) == 0
+
+
+def test_what_the_last_bit_of_the_inputs_moves_is_no_fault_of_a_formula():
+    """A power of a cosine near its right angle, which is a difference of products: another last bit is another value."""
+    stack = structures()["phong, scaling faithful"]
+    tried = grid(stack, corners=2)
+    pairs = tuple(w.astype(np.float32) for w in directions()[:2])
+    single, double = (measure.values_of(tried.stack(stack, dtype), *pairs, dtype) for dtype in (np.float32, np.float64))
+    error = measure.value_error(single.f, double.f)
+    moved = measure.by_last_bits(double, tried)
+    assert sweep.beyond(single.f, double.f, np.zeros_like(moved)) > 0
+    assert sweep.beyond(single.f, double.f, moved) == 0
+    # Neighbours in float32 are as far apart, at the pair that is worst.
+    row, pair = np.unravel_index(np.argmax(error), error.shape)
+    material = tried.material(stack, int(row)).astype(np.float64)
+    here = [w[pair] for w in pairs]
+    beside = [np.nextafter(w, np.float32(side)) for w, side in zip(here, (2.0, -2.0), strict=True)]
+    with jax.enable_x64(True):
+        values = [float(brdf(material, *(jnp.asarray(w[None], float) for w in at))[0, 0]) for at in (here, beside)]
+    assert report.MAX_REL * abs(values[0]) < abs(values[1] - values[0]) < moved[row, pair]
 
 
 def test_a_line_holds_the_index_of_another_layer_and_what_is_beside_it():
@@ -211,10 +235,11 @@ def test_digits_see_a_wrong_derivative_and_leave_out_a_kink():
     row = int(tried.lines["base.alpha"][4])
     cases = exact.in_exact(stack, tried, pairs, [row], worst, double, 0)
     limits_of = (1e-10, 1e-13, 1e-7)
-    held = exact.judged(cases, double, tried, limits_of, pairs)
+    moved = np.zeros_like(double.f)
+    held = exact.judged(cases, double, tried, limits_of, moved, pairs)
     assert (held["value_beyond"], held["slope_beyond"]) == (0, 0)
     wrong = dataclasses.replace(double, slopes=1.001 * double.slopes)
-    assert exact.judged(cases, wrong, tried, limits_of, pairs)["slope_beyond"] > 0
+    assert exact.judged(cases, wrong, tried, limits_of, moved, pairs)["slope_beyond"] > 0
 
 
 def test_a_base_that_is_not_seen_has_a_compact_tier():

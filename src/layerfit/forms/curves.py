@@ -57,7 +57,7 @@ class Interface:
     gain: Scalar = member("part of the reflected light that a second facet lets in")
     passed: Vec4 = member("energy that passes, beyond the closed form: four coefficients")
     passed_high: Vec2 = member("the other two, of higher powers")
-    bend: Vec4 = member("sine of the refracted light over that at a smooth interface, beyond 1")
+    bend: Vec4 = member("part by which the sine of light becomes smaller below")
     bend_high: Vec2 = member("")
     spread: Vec4 = member("width of a lobe seen through it, over that of the facets")
     spread_high: Vec2 = member("")
@@ -73,6 +73,8 @@ class Nodes:
 
     z: Float[Array, " m"]
     """Cosine of the median direction below."""
+    turn: Float[Array, " m"] | None
+    """Sine below over that at a smooth interface, beyond 1; not of several interfaces together."""
     T: Float[Array, " m"]
     """Energy that passes."""
     spread: Float[Array, " m"]
@@ -142,15 +144,16 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     dtype = eta.dtype
     at = jnp.einsum("e,a,eaq->q", _cubic(eta, baked.eta), _cubic(alpha, baked.alpha), jnp.asarray(baked.values, dtype))
     count = len(baked.mu)
-    dT, rx, w, path, theta = at[: 5 * count].reshape(5, count)
+    dT, turn, w, path, theta = at[: 5 * count].reshape(5, count)
     R = at[5 * count :]
     mu = jnp.asarray(baked.mu, dtype)
     sin2 = (1.0 - mu) * (1.0 + mu)
-    bend = STEER * (rx - 1.0)
-    z = _below(mu, sin2, (1.0 + bend) / eta)
+    # As a part of itself by which the sine changes, not as what is left of it: where the indices match that has no digit of the change.
+    bend = smaller(eta, STEER * turn)
+    z = _below(mu, sin2, bend)
     spread = WIDTH * w
     # The path of the tables is that of their own direction.
-    longer = path * z / _below(mu, sin2, rx / eta)
+    longer = path * z / _below(mu, sin2, smaller(eta, turn))
     hidden = dT * clip((eta - 1.0) / MASKED, 0.0, 1.0)
     rows = (hidden, bend, spread, longer, theta)
     curves = [part for row in rows for part in parts(polynomial(row))]
@@ -162,6 +165,7 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     weights = 2.0 * (jnp.asarray(baked.quadrature, dtype) @ R) * cosines * widths
     nodes = Nodes(
         z,
+        STEER * turn,
         T,
         spread * alpha,
         jnp.maximum(longer, 1.0) / z,
@@ -173,10 +177,15 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     return Interface(tilt, gain, *curves), nodes
 
 
+def smaller(n: Any, turn: Any) -> Any:
+    """Part by which the sine of light becomes smaller in a medium of index n, where it is 1 + turn times that of Snell's law."""
+    return ((n - 1.0) - turn) / n
+
+
 def _below(mu: Any, sin2: Any, bend: Any, xp: Any = jnp) -> Any:
-    """Cosine below of light whose sine changes by `bend`; what a denser medium refracts does not graze more than before."""
-    bend = xp.minimum(bend, 1.0)
-    return xp.sqrt(mu * mu + (1.0 - bend) * (1.0 + bend) * sin2)
+    """Cosine below of light whose sine becomes smaller by the part `bend`; what a denser medium refracts does not graze more than before."""
+    bend = xp.maximum(bend, 0.0)
+    return xp.sqrt(mu * mu + bend * (2.0 - bend) * sin2)
 
 
 def diffuse_return(nodes: Nodes, tau: Colour | None) -> Colour:
@@ -269,11 +278,12 @@ def _baking(kind: Kind) -> _Baking:
     below = t.mu_below[-1].astype(float)
     part = np.where(below < edge, below / edge, 1.0 + (below - edge) / (1.0 - edge)) - 1.0
     mean, theta = inverse_gaussian(t.kt.astype(float), np.exp(t.lt.astype(float)))
-    z = _below(mu, 1.0 - mu * mu, t.rx / eta[:, None, None], np)
+    turn = t.rx.astype(float) - 1.0
+    z = _below(mu, 1.0 - mu * mu, smaller(eta[:, None, None], turn), np)
     # Where the indices match light goes straight on.
     nothing = np.zeros_like(t.dT[:1])
-    first = (t.dT[:1], nothing + 1.0, nothing, nothing + 1.0, nothing, np.zeros_like(t.Rb[:1]))
-    columns = [np.concatenate(pair) for pair in zip(first, (t.dT, t.rx, t.w, (1.0 + mean) * z, theta, t.Rb), strict=True)]
+    first = (t.dT[:1], nothing, nothing, nothing + 1.0, nothing, np.zeros_like(t.Rb[:1]))
+    columns = [np.concatenate(pair) for pair in zip(first, (t.dT, turn, t.w, (1.0 + mean) * z, theta, t.Rb), strict=True)]
     x, _ = _gauss()
     at = lambda parts: np.stack([_cubic(p, part, np) for p in parts])  # noqa: E731
     quadrature, cells = at(np.concatenate([x - 1.0, x])), at(np.arange(2 * CELLS + 1) / CELLS - 1.0)

@@ -166,12 +166,12 @@ def pass_interface(interface: Interface, eta: Scalar, alpha: Widths, w: Directio
     T = rough_transmittance(facet_cosine(w, interface.tilt), eta, interface.gain)
     T = clip(T + curve(interface.passed, interface.passed_high, s), 0.0, 1.0)
     # What a denser medium refracts does not graze more than before. The cosine keeps its digits there, also where the indices match.
-    bend = jnp.minimum((1.0 + curve(interface.bend, interface.bend_high, s)) / eta, 1.0)
-    z = jnp.sqrt(w[-1] * w[-1] + (1.0 - bend) * (1.0 + bend) * sine2(w))
+    bend = jnp.maximum(curve(interface.bend, interface.bend_high, s), 0.0)
+    z = jnp.sqrt(w[-1] * w[-1] + bend * (2.0 - bend) * sine2(w))
     a = jnp.maximum(curve(interface.spread, interface.spread_high, s), 0.0) * alpha
     path = jnp.maximum(curve(interface.path, interface.path_high, s), 1.0) / z
     theta = jnp.maximum(curve(interface.theta, interface.theta_high, s), 0.0)
-    return Crossing(direction(along(w) * bend, z), T, a, path, theta, s)
+    return Crossing(direction(along(w) * (1.0 - bend), z), T, a, path, theta, s)
 
 
 @chunk

@@ -27,6 +27,7 @@ from .curves import (
     absorbed,
     added,
     bake,
+    curve,
     depth,
     diffuse_return,
     gauss,
@@ -34,6 +35,7 @@ from .curves import (
     parts,
     polynomial,
     presence,
+    smaller,
     spread_root,
 )
 from .one_coat import Crossing, between, direct, lean, pass_interface, split
@@ -42,9 +44,11 @@ from .tables import Kind
 HELD = ("top", "both", "passed", "inner_again", "inner_rest", "returned", "again", "rest")
 """Parts of a prepared material that a shader holds as constants, also where its other numbers can be set."""
 
+WIDEST_SINE = 0.9998
+"""Of light on the rarer side of a boundary that came from the denser one."""
+
 STEEPEST = 30.0
 """Largest factor by which refraction stretches the spread of a path."""
-
 
 LONGEST = 8.0
 """Of what the spread of the light adds to its path, in thicknesses."""
@@ -90,6 +94,12 @@ class _Top:
     def passes(self, w: Direction) -> Crossing:
         return pass_interface(self.interface, self.eta, self.alpha, w)
 
+    def turns(self, s: Float[Array, " m"]) -> Float[Array, " m"]:
+        """Sine below over that at a smooth boundary, beyond 1, for light that the curves' argument s belongs to."""
+        assert self.nodes.turn is not None
+        low, high = jnp.split(polynomial(jnp.asarray(self.nodes.turn)), 2)
+        return jnp.minimum(jax.vmap(lambda s: curve(low, high, s))(s), self.eta - 1.0)
+
     def reflects(self, z: Float[Array, " k"]) -> Float[Array, " k"]:
         """Energy that is reflected of light from the denser side at cosines z: straight lines between all nodes at which it is known."""
         edge = self.edge
@@ -111,7 +121,7 @@ def prepare(outer: Coat, inner: Coat, base: Any, kind: Kind) -> Prepared:
     inner_again, inner_rest = bounces(first.nodes, outer.alpha, coats[0], boundary)
     base = base.below(n2)
     way = _way(first, second, coats)
-    both = _composed(first, way)
+    both = _composed(first, second, way, n2)
     passed, returned, again, rest = _over_colours(first, second, coats, base, way)
     return Prepared(coats, first.interface, both, passed, inner_again, inner_rest, base, returned, again, rest)
 
@@ -161,8 +171,8 @@ def upwards(w: Direction, eta: Scalar) -> Direction:
     """A direction below a smooth boundary, as it is above it; `eta` is the index below over that above."""
     part = eta * along(w)
     sine = safe_sqrt(dot(part, part))
-    held = jnp.minimum(1.0, 0.9998 / jnp.maximum(sine, 1e-6))
-    sine = jnp.minimum(sine, 0.9998)
+    held = jnp.minimum(1.0, WIDEST_SINE / jnp.maximum(sine, 1e-6))
+    sine = jnp.minimum(sine, WIDEST_SINE)
     return direction(part * held, safe_sqrt((1.0 - sine) * (1.0 + sine)))
 
 
@@ -213,11 +223,19 @@ def held(x: Scalar) -> Scalar:
     return x / jnp.sqrt(1.0 + (x / LONGEST) ** 2)
 
 
-def _composed(first: _Top, way: tuple[Any, Crossing, Crossing, Crossing]) -> Interface:
-    """Curves of the whole way, to be read like those of one top: for the outer coat's index and a width of 1."""
-    w, _, _, x = way
-    bend = x.w[:, 0] / w[:, 0] * first.eta - 1.0
-    rows = {"bend": bend, "spread": x.a, "path": x.path * x.w[:, 2], "theta": x.theta}
+def _composed(first: _Top, second: _Top, way: tuple[Any, Crossing, Crossing, Crossing], n: Scalar) -> Interface:
+    """Curves of the whole way to the medium of index n, to be read like those of one top: for the outer coat's index and a width of 1."""
+    _, a, b, x = way
+    # What both add to Snell's law: as the ratio of two sines it would have no digits where n is that of air.
+    turn_a, turn_b = first.turns(a.s), second.turns(b.s)
+    held = jnp.minimum(WIDEST_SINE / (second.eta * a.w[:, 0]) - 1.0, 0.0)
+    turn_b = where(n >= first.eta, turn_b, held)
+    rows = {
+        "bend": smaller(n, turn_a + turn_b + turn_a * turn_b),
+        "spread": x.a,
+        "path": x.path * x.w[:, 2],
+        "theta": x.theta,
+    }
     halves: dict[str, Any] = {}
     for name, row in rows.items():
         halves[name], halves[f"{name}_high"] = parts(polynomial(row))
@@ -259,7 +277,7 @@ def _energies(
     cosines, widths = gauss(edge)
     from_below = lambda z: _reflected(first, second, coats, tau, z)  # noqa: E731
     weights = 2.0 * from_below(cosines) * cosines * widths
-    nodes = Nodes(x.w[:, 2], a.T * passed * once, x.a, x.path, x.theta, from_below(cells_of(edge)), cosines, weights)
+    nodes = Nodes(x.w[:, 2], None, a.T * passed * once, x.a, x.path, x.theta, from_below(cells_of(edge)), cosines, weights)
     return passed, nodes
 
 

@@ -119,15 +119,21 @@ def in_exact(
     return cases
 
 
-def judged(cases: list[Case], values: Values, tried: Grid, limits: tuple[float, float, float], pairs: Any) -> dict[str, Any]:
-    """How far a precision is from the cases; `limits` are a value's, relative and absolute, and a slope's. With the worst, to reproduce."""
+def judged(
+    cases: list[Case], values: Values, tried: Grid, limits: tuple[float, float, float], moved: np.ndarray, pairs: Any
+) -> dict[str, Any]:
+    """How far a precision is from the cases; `limits` are a value's, relative and absolute, and a slope's. With the worst, to reproduce.
+
+    `moved` (m, d[, 3]) is by how much the rounding of the inputs moves values.
+    """
     names = [*(f.name for f in tried.free), "turn of wi", "turn of wo"]
     error, absolute, slope = compared(cases, values, fit_scale(tried))
     beyond = slope > limits[2]
+    of_inputs = np.array([moved[case.row, case.pair].max() for case in cases])
     at, (k, j) = int(np.argmax(error)), np.unravel_index(np.argmax(slope), slope.shape)
     return {
         "value_max": float(error[at]),
-        "value_beyond": int(np.sum((error > limits[0]) & (absolute > limits[1]))),
+        "value_beyond": int(np.sum((error > limits[0]) & (absolute > np.maximum(limits[1], of_inputs)))),
         "slope_max": float(slope[k, j]),
         "slope_beyond": int(np.sum(beyond)),
         "worst_value": _told(cases[at], tried, pairs) | {"exact": cases[at].f.tolist()},

@@ -98,6 +98,17 @@ def value_error(single: np.ndarray, double: np.ndarray) -> np.ndarray:
     return _worst(np.abs(single - double) / np.maximum(np.abs(double), FLOOR), single, double)
 
 
+ROUNDINGS = 4.0
+"""As many of its inputs' last bits as a value may be off by: the steps of a formula round as the inputs did."""
+
+
+def by_last_bits(double: Values, tried: Grid) -> np.ndarray:
+    """How far values (m, d[, 3]) move with the last bit in float32 of every parameter and of both directions: what no formula has digits of."""
+    sizes = np.concatenate([np.abs(tried.values.T), np.ones((2, len(tried.values)))])
+    moved = np.einsum("nm,nm...->m...", sizes, np.abs(double.slopes))
+    return ROUNDINGS * 0.5 * float(np.finfo(np.float32).eps) * moved
+
+
 def fit_scale(tried: Grid) -> np.ndarray:
     """d value / d coordinate of a fit (n, m), of every parameter of every material."""
     columns = zip(tried.free, tried.values.T, strict=True)

@@ -25,7 +25,7 @@ from .digits import numbers
 from .effort import USUAL, Effort
 from .exact import in_exact, judged
 from .grid import POLAR_DEG, Grid, directions, grid
-from .measure import Values, plain_values, slope_error, value_error, values_of
+from .measure import Values, by_last_bits, plain_values, slope_error, value_error, values_of
 from .models import structures
 from .tier import TIERS, try_tier
 
@@ -107,7 +107,7 @@ def try_structure(name: str, stack: Stack, effort: Effort = USUAL) -> dict[str, 
         "materials": len(tried.values),
         "combinations": int(value.size) + sum(found["combinations"] for found in made),
         "not_finite": int(lost) + sum(found["not_finite"] for found in made),
-        "beyond": beyond(single.f, double.f),
+        "beyond": beyond(single.f, double.f, by_last_bits(double, tried)),
         "value_rel": _quantiles(value),
         "slope_rel": _quantiles(slope),
         "breaks": breaks,
@@ -121,10 +121,10 @@ def try_structure(name: str, stack: Stack, effort: Effort = USUAL) -> dict[str, 
     return entry | {"good": report.good(entry)}
 
 
-def beyond(single: np.ndarray, double: np.ndarray) -> int:
-    """Combinations (m, d) of which float32 is off by more than the tolerance, relative and absolute."""
+def beyond(single: np.ndarray, double: np.ndarray, moved: np.ndarray) -> int:
+    """Combinations (m, d) of which float32 is off by more than the tolerance, relative and absolute, and than the inputs' last bits move it."""
     off = np.abs(single - double)
-    far = ~((off <= report.MAX_REL * np.abs(double)) | (off <= report.MAX_ABS))
+    far = ~((off <= report.MAX_REL * np.abs(double)) | (off <= report.MAX_ABS) | (off <= moved))
     return int(np.sum(far if far.ndim == 2 else far.any(-1)))
 
 
@@ -146,7 +146,10 @@ def _digits(
         (report.MAX_REL, report.MAX_ABS, report.SLOPE_REL),
         (report.MAX_REL_DOUBLE, report.MAX_ABS_DOUBLE, report.SLOPE_REL_DOUBLE),
     )
-    single, double = (judged(cases, v, tried, limit, pairs) for v, limit in zip(values, limits_of, strict=True))
+    moved = by_last_bits(values[1], tried)
+    allowed = moved, np.zeros_like(moved)  # float64 is tried at numbers of float32
+    found = zip(values, limits_of, allowed, strict=True)
+    single, double = (judged(cases, v, tried, limit, of_inputs, pairs) for v, limit, of_inputs in found)
     slopes = sum(case.slopes.size for case in cases)
     return {
         "cases": len(cases),

@@ -72,8 +72,13 @@ class LafortuneLobe(Lobe):
         return same_light * _power(log_product - log_scale, exponent) * _power(log_scale, self.exponent)
 
 
+BRIGHTEST = 60.0
+"""Logarithm at which a lobe is held. Weights of 2 and a high exponent make more of it than float32 holds; times the largest strength, of
+three lobes and many pixels, this and its derivatives by a factor of the exponent stay within."""
+
+
 def _power(log_base: Scalar, exponent: Scalar) -> Scalar:
-    return jnp.exp(jnp.minimum(exponent * log_base, 80.0))
+    return jnp.exp(jnp.minimum(exponent * log_base, BRIGHTEST))
 
 
 def _ks(default: float | None) -> Any:

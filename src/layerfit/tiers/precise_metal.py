@@ -197,7 +197,7 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
     def follow(NoW: Any) -> Any:
         crossing = one_coat.pass_interface(interface, eta, coat.alpha, jnp.stack([jnp.sqrt(1.0 - NoW * NoW), 0.0 * NoW, NoW]))
         s, z = crossing.s, crossing.w[2]
-        bend = (1.0 + curve(interface.bend, interface.bend_high, s)) / eta
+        bend = 1.0 - curve(interface.bend, interface.bend_high, s)
         beyond = curve(interface.passed, interface.passed_high, s) / eta
         return (
             s,
