@@ -51,7 +51,7 @@ MATERIALS = {
         1e-3,
     ),
     "corrected, Beckmann": (Stack((LACQUER,), Conductor(alpha=0.2, distribution="beckmann", **COPPER), Corrected()), 1e-3),
-    "corrected, two coats": (Stack((Coat(name="clear", alpha=0.1, eta=1.4), LACQUER), METAL, Corrected()), 1e-3),
+    "corrected, two coats": (Stack((Coat(name="clear", alpha=0.05, eta=1.4), LACQUER), METAL, Corrected()), 1e-3),
     "corrected, film": (
         Stack((dataclasses.replace(LACQUER, film_nm=150.0, film_eta=2.1),), PAPER, Corrected()),
         1e-3,

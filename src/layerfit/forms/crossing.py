@@ -18,7 +18,7 @@ from ..optics.interface import (
     spread_lengthening,
     with_second_facet,
 )
-from ..optics.medium import refract_about_normal
+from ..optics.medium import cosine_below, refract_about_normal
 from ..optics.microfacet import Width
 
 
@@ -72,9 +72,10 @@ class Crossing:
 def cross(interface: Interface, coat: Coat, w: Direction, air: Direction) -> Crossing:
     """Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them."""
     c = facet_cosine(w, interface.tilt)
+    # Out of a denser medium the fits do not hold for the energy: there the interface passes light as a smooth one.
+    rarer = where(coat.eta >= 1.0, c, cosine_below(air[-1], interface.n))
+    T = with_second_facet(coat.passes(rarer), interface.gain)
+    grazing = drift(w, interface.drift, interface.alpha)
     # From air at once, not from layer to layer: going back to index 1 gives the same direction to the last bit.
     below = refract_about_normal(air, interface.n)
-    # Out of a denser medium the fits do not hold for the energy: there the interface passes light as a smooth one.
-    T = with_second_facet(coat.passes(where(coat.eta >= 1.0, c, below[-1])), interface.gain)
-    grazing = drift(w, interface.drift, interface.alpha)
     return Crossing(below, T, slope_spread(c, coat.eta), interface.lengthening + grazing, grazing)

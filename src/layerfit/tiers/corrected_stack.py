@@ -59,7 +59,8 @@ class Covered:
     edge: Polynomial
     """Of the sine: half of what leaves the escape cone."""
     back: Polynomial | None
-    """Of the cosine: what two coats send back down; one coat sends back what does not pass."""
+    """Of the mean facet's too, as a polynomial of 0 to 1 is a sum of large terms: what two coats send back down; one coat sends back what does
+    not pass."""
     variance: Polynomial
     """Of the width that the coats add: squared widths of the lobes, one an order; of Beckmann's what is more than its own."""
     reflectance: Polynomial
@@ -75,8 +76,9 @@ class Covered:
 
     def way(self, NoW: Scalar, tilt: Scalar) -> LobeWay:
         """Follow one direction there."""
-        way = lobe_way(self.passed, self.refracted, self.edge, self.n, tilt, NoW)
-        return way if self.back is None else replace(way, R=self.back(NoW))
+        facet = 2.0 * argument("facet", NoW, tilt) - 1.0
+        way = lobe_way(self.passed, self.refracted, self.edge, self.n, facet, NoW)
+        return way if self.back is None else replace(way, R=self.back(facet))
 
     def meet(self, i: LobeWay, o: LobeWay, x2: Scalar, flake: "Tilted | None") -> Colour:
         """Its lobes [1/sr]; `x2` is the squared length of the sum of the directions' parts along the surface below the coats."""
@@ -116,13 +118,12 @@ def lobe_way(
     refracted: Polynomial,
     edge: Polynomial,
     n: Scalar,
-    tilt: Scalar,
+    facet: Scalar,
     NoW: Scalar,
 ) -> LobeWay:
-    """Follow one direction to a boundary below coats."""
-    NoW2 = NoW * NoW
-    sin2 = 1.0 - NoW2
-    energy = passed(2.0 * jnp.sqrt(tilt + (1.0 - tilt) * NoW2) - 1.0)
+    """Follow one direction to a boundary below coats; `facet` is the cosine of the mean facet as -1 to 1."""
+    sin2 = 1.0 - NoW * NoW
+    energy = passed(facet)
     T, width = colour_of(energy), energy[-1]
     below = refracted(NoW)
     absorbs = jnp.ndim(below) > 0
@@ -385,7 +386,7 @@ def _covered(
         "reflectance": reflectance_curve(lobe, cosine, 6),
     }
     if depth > 1:
-        curves["back"] = Curve(NoW, met["R"])
+        curves["back"] = Curve(curves["passed"].x, met["R"])
     n = float(np.prod([float(coat.eta) for coat in coats[:depth]]))
     rest = {"own2": own2, "n": jnp.asarray(n), "tau": above.extinction, "distribution": lobe.distribution, "film": filmed(lobe)}
     return curves, rest
