@@ -24,7 +24,7 @@ HELP = (
     "drag: turn   yellow mark or Shift: light   wheel: nearer",
     "Up, Down: choose   Left, Right: move (Shift: more)",
     "Home: this one as it was   R: all   S: save as a preset",
-    "comma, period: exposure   T: tone   Esc: close",
+    "comma, period: exposure   T: tone   M: shape   Esc: close",
 )
 
 

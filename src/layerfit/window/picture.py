@@ -1,6 +1,6 @@
-"""A sphere of a material in a context of OpenGL: passes of its shader, each with other points of the lights, added up until still.
+"""A shape of a material in a context of OpenGL: passes of its shader, each with other points of the lights, added up until still.
 
-The stages, the lights and the camera are those of the pages (`report/page`), so that a window and a page show the same.
+The stages, the lights, the camera and the shapes are those of the pages (`report/page`), so that a window and a page show the same.
 """
 
 import json
@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ..capture.geometry import normalise, sphere_mesh
+from ..capture.geometry import normalise
 from ..report import pages
 from ..shader.export import HEADERS, Shader
+from .shapes import mesh
 
 PASSES = 768
 LIGHTS = 4
 """In one pass: the key light, and a point of each soft box."""
-ROWS, COLUMNS = 96, 192
 HALF_FOV = math.radians(13.0)
 SLOW_S = 0.1
 """A pass that takes longer keeps the hand waiting: it is drawn in fewer pixels."""
@@ -85,8 +85,9 @@ def replaced(old: Any, new: Any) -> Any:
     """A framebuffer that takes the place of another, which is given back; None for the first."""
     new.use()  # before the old one goes: moderngl would bind the released one again
     if old is not None:
-        old.color_attachments[0].release()
-        old.release()
+        for held in (*old.color_attachments, old.depth_attachment, old):
+            if held is not None:
+                held.release()
     return new
 
 
@@ -100,32 +101,47 @@ class Picture:
         fragment = shader.text().replace(header, f"{header}\n#define LF_LIGHTS {LIGHTS}", 1)
         self.material = ctx.program(vertex_shader=stage("mesh.vert"), fragment_shader=fragment)
         self.shown = ctx.program(vertex_shader=stage("screen.vert"), fragment_shader=stage("show.frag"))
-        self.mesh, self.nothing = self._sphere(), ctx.vertex_array(self.shown, [])
+        self.added = ctx.program(vertex_shader=stage("screen.vert"), fragment_shader=stage("add.frag"))
+        self.nothing = {program: ctx.vertex_array(program, []) for program in (self.shown, self.added)}
+        self.meshes: dict[str, Any] = {}
+        self.shape = "sphere"
         self.values: Mapping[str, np.ndarray] = shader.uniforms
         self.yaw, self.pitch, self.distance = 0.0, 0.17, 5.0
         self.light = (-0.65, 0.6)
         self.exposure, self.tone = 0.0, 0
         self.passes, self.fineness = 0, 1.0
-        self.total: Any = None
+        self.one: Any = None
+        """The pass that is drawn, with its depths."""
+        self.totals: list[Any] = [None, None]
+        """Two sums of passes: each is written with the other before it."""
         self.resize((1, 1))
         self._draw()  # some drivers compile only then, which says nothing of their pace
 
-    def _sphere(self) -> Any:
-        """The mesh of the pages, with as much of a vertex as the shader reads."""
-        normal, tangent, uv, triangles = sphere_mesh(ROWS, COLUMNS)
-        known = {"a_position": normal, "a_normal": normal, "a_tangent": tangent, "a_uv": uv}
-        buffers = [
-            (self.ctx.buffer(values.astype("f4").tobytes()), f"{values.shape[1]}f", name)
-            for name, values in known.items()
-            if name in self.material
-        ]
-        return self.ctx.vertex_array(self.material, buffers, self.ctx.buffer(triangles.astype("u4").tobytes()))
+    def _mesh(self) -> Any:
+        """That of the shape, with as much of a vertex as the shader reads."""
+        if self.shape not in self.meshes:
+            vertices, triangles = mesh(self.shape)
+            buffers = [
+                (self.ctx.buffer(values.astype("f4").tobytes()), f"{values.shape[1]}f", name)
+                for name, values in vertices.items()
+                if name in self.material
+            ]
+            corners = self.ctx.buffer(triangles.astype("u4").tobytes())
+            self.meshes[self.shape] = self.ctx.vertex_array(self.material, buffers, corners)
+        return self.meshes[self.shape]
+
+    @property
+    def total(self) -> Any:
+        """The sum of the passes: a framebuffer."""
+        return self.totals[self.passes % 2]
 
     def resize(self, size: tuple[int, int]) -> None:
         """Take a size in pixels, and begin anew."""
         self.size = size
-        width, height = (max(1, round(side * self.fineness)) for side in size)
-        self.total = replaced(self.total, self.ctx.framebuffer([self.ctx.texture((width, height), 4, dtype="f4")]))
+        fine = tuple(max(1, round(side * self.fineness)) for side in size)
+        texture = lambda: [self.ctx.texture(fine, 4, dtype="f4")]  # noqa: E731
+        self.one = replaced(self.one, self.ctx.framebuffer(texture(), self.ctx.depth_renderbuffer(fine)))
+        self.totals = [replaced(total, self.ctx.framebuffer(texture())) for total in self.totals]
         self.restart()
 
     def change(self, **changes: Any) -> None:
@@ -150,13 +166,15 @@ class Picture:
     def _draw(self) -> float:
         """A pass; returns how long it took [s]."""
         begun, k = time.perf_counter(), self.passes
-        self.total.use()
         if k == 0:
             self.total.clear()
-        self.ctx.enable_only(self.ctx.CULL_FACE | self.ctx.BLEND)  # a sphere hides nothing of itself but its back
-        self.ctx.blend_func = self.ctx.ONE, self.ctx.ONE
+        self.one.use()
+        self.one.clear()
+        self.ctx.enable_only(self.ctx.DEPTH_TEST)
         self._set(k)
-        self.mesh.render()
+        self._mesh().render()
+        self.ctx.enable_only(self.ctx.NOTHING)
+        self._screen(self.added, self.totals[(k + 1) % 2], {"u_total": self.total, "u_pass": self.one})
         self.passes += 1
         self.ctx.finish()
         return time.perf_counter() - begun
@@ -174,14 +192,16 @@ class Picture:
 
     def present(self, target: Any) -> None:
         """The mean of the passes as a screen shows it, onto a framebuffer of this picture's own size; nothing is drawn behind it."""
-        target.use()
         self.ctx.enable_only(self.ctx.NOTHING)
-        self.total.color_attachments[0].use(0)
-        for name, value in {
-            "u_total": 0,
-            "u_passes": float(self.passes),
-            "u_exposure": 2.0**self.exposure,
-            "u_tone": self.tone,
-        }.items():
-            self.shown[name].value = value
-        self.nothing.render(self.ctx.TRIANGLES, vertices=3)
+        numbers = {"u_passes": float(self.passes), "u_exposure": 2.0**self.exposure, "u_tone": self.tone}
+        self._screen(self.shown, target, {"u_total": self.total}, numbers)
+
+    def _screen(self, program: Any, target: Any, pictures: Mapping[str, Any], numbers: Mapping[str, Any] = {}) -> None:
+        """Fill a framebuffer by a program that reads pictures of its size."""
+        target.use()
+        for k, (name, picture) in enumerate(pictures.items()):
+            picture.color_attachments[0].use(k)
+            program[name].value = k
+        for name, value in numbers.items():
+            program[name].value = value
+        self.nothing[program].render(self.ctx.TRIANGLES, vertices=3)

@@ -17,6 +17,7 @@ from ..shader.export import HEADERS, print_material, uniforms_of
 from ..stack import Stack
 from .panel import LEAP, STEP, WIDTH, Panel
 from .picture import Camera, Picture, replaced, toward
+from .shapes import SHAPES
 
 SIZE = (1040, 700)
 SUN = 9
@@ -145,6 +146,10 @@ class Screen:
         elif key == keys.T:
             self.picture.tone = (self.picture.tone + 1) % len(TONES)
             self.told(f"tone: {TONES[self.picture.tone]}")
+        elif key == keys.M:
+            shapes = list(SHAPES)
+            self.picture.change(shape=shapes[(shapes.index(self.picture.shape) + 1) % len(shapes)])
+            self.told(f"shape: {self.picture.shape}")
         elif key in (keys.COMMA, keys.PERIOD):
             self.picture.exposure += 0.25 if key == keys.PERIOD else -0.25
             self.told(f"exposure: {self.picture.exposure:+.2f}")
