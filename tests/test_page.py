@@ -293,3 +293,12 @@ def test_a_view_can_be_a_file(tmp_path):
     ran = layerfit("view", "bare_concrete", "-o", tmp_path / "concrete.html")
     assert ran.code == 0
     assert (tmp_path / "concrete.html").read_text().startswith("<!doctype html>")
+
+
+def test_a_phone_shows_a_long_name_without_scrolling_across(browser, tmp_path):
+    path = tmp_path / "page.html"
+    path.write_text(view.page(read_preset("bare_concrete"), "metallic_blue_car_paint"))
+    with opened(browser, path.as_uri()) as page:
+        page.evaluate("layerfit.views[0].limit = 0")
+        page.set_viewport_size({"width": 360, "height": 740})
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
