@@ -6,6 +6,7 @@ import json
 import os
 import re
 import resource
+import shlex
 import shutil
 import sys
 from pathlib import Path
@@ -170,7 +171,7 @@ PRESETS = {
     "empty": (lambda p: p.write_text(""), [r"not valid JSON"]),
     "missing": (lambda p: p.unlink(), [r"cannot be read: No such file", r"Check the path"]),
     "a directory": (lambda p: (p.unlink(), p.mkdir()), [r"directory"]),
-    "a picture": (lambda p: shutil.copy(p.parent / "reference.exr", p), [r"not UTF-8 text", r"another kind of file"]),
+    "a picture": (lambda p: shutil.copy(p.parent / "reference.exr", p), [r"is an EXR image", r"layerfit inspect"]),
 }
 
 
@@ -207,21 +208,46 @@ def test_a_table_that_cannot_be_read(name, folder):
     refuses(folder, arguments, r"d\.csv: ", *said)
 
 
-def test_a_target_that_is_not_there(folder):
-    refuses(
-        folder,
-        ["export", folder / "truth.json", "--target", "glsl33"],
-        r"--target glsl33",
-        r"did you mean 'glsl330'",
-        r"essl300",
-    )
+MISUSED = {
+    "fit": r"fit: Missing argument 'scene'\. `layerfit fit --help`",
+    "ft scene.toml": r"Did you mean 'fit'\? `layerfit --help`",
+    "help fit": r"No such command 'help'\. `layerfit --help`",
+    "--json presets": r"--json is of a command: put it after, as in `layerfit presets --json`",
+    "fit scene.toml --ouput x": r"fit: No such option: --ouput .*--output.*`layerfit fit --help`",
+    "fit scene.toml extra": r"unexpected extra argument.*extra.*`layerfit fit --help`",
+    "fit scene.toml -o ''": r"an argument is empty: has a variable of the shell no value\?",
+    "fit scene.toml --starts ten": r"fit: Invalid value for '--starts'.*integer",
+    "fit scene.toml --starts 1001": r"fit\.starts = 1001: should be a whole number from 1 to 1000",
+    "fit scene.toml --loss hubert": r"fit\.loss = 'hubert': should be one of square, huber, cauchy \(did you mean 'huber'\?\)",
+    "batch scene.toml --metric loog": r"metric = 'loog': should be one of .*did you mean 'log'",
+    "structures scene.toml --metric loog": r"metric = 'loog': should be one of .*did you mean 'log'",
+    "structures scene.toml --only metl": r"structure 'metl': should be one of .*did you mean 'metal'",
+    "map scene.toml --free coat.alpha --starts 1001": r"map\.starts = 1001: should be a whole number",
+    "map scene.toml --free coat.alpha --shared coat.alpha": r"coat\.alpha is both free and shared",
+    "fit scene": r"scene: cannot be read: No such file.*did you mean 'scene\.toml'",
+    "inspect referense.exr": r"cannot be read: No such file.*did you mean 'reference\.exr'",
+    "fit lacquered_copper": r"is a preset that ships, not a scene file.*--start lacquered_copper",
+    "fit truth.json": r"is a layerfit/preset, not a scene file.*preset = \"truth\.json\"",
+    "fit reference.exr": r"reference\.exr: is an EXR image.*layerfit inspect",
+    "render scene.toml truth.json -o a.exr": r"is a scene file, not a preset.*layerfit presets",
+    "render truth.json scene.toml -o a.exr --max-error 0.01": r"--max-error is for --tier compact or tables",
+    "export truth.json --target glsl33": r"--target glsl33: .*essl300.*did you mean 'glsl330'",
+    "export truth.json --max-error 0": r"a largest error of 0: it should be above 0",
+    "export truth.json --max-error nan": r"a largest error of nan: it should be above 0",
+    "export truth.json --to gltf --target essl300": r"--target, .* are of the shader: leave them out, or --to",
+    "export truth.json --to gltf -o copper.mtlx": r"copper\.mtlx: --to gltf writes a file that ends in \.gltf",
+    "verify truth.json --fail nan": r"verify: Invalid value for '--fail'",
+    "blender-kit -o .": r"\.: cannot be written: it is a directory.*the name of a file",
+    "presets coper": r"no shipped preset has 'coper'.*did you mean 'copper'",
+    "metal coppr": r"'coppr' is not known; near are copper\. `layerfit metal` lists",
+}
+"""Wrong words by the message for them."""
 
 
-def test_a_loss_that_is_not_there(folder):
-    ran = layerfit("fit", folder / "scene.toml", "-o", folder / "new", "--loss", "hubert")
-    assert ran.code == 2
-    assert "square, huber or cauchy" in ran.err
-    assert not (folder / "new").exists()
+@pytest.mark.parametrize("words", MISUSED)
+def test_wrong_words_are_told_what_is_right(words, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    refuses(folder, shlex.split(words), MISUSED[words])
 
 
 def outputs(folder):

@@ -171,8 +171,8 @@ def test_what_is_written_of_a_search(tmp_path, gl):
     ("arguments", "said"),
     [
         (["none.bsdf"], "cannot be read"),
-        (["a.csv", "--only", "coats"], "is not one of diffuse"),
-        (["a.csv", "--metric", "logs"], "is not law, uniform"),
+        (["a.csv", "--only", "coats"], "should be one of diffuse"),
+        (["a.csv", "--metric", "logs"], "should be one of law, uniform"),
         (["scene.toml"], "there is no [reference]"),
     ],
 )

@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from textwrap import dedent
 from typing import Any
 
 from mkdocs.structure.files import File, Files
@@ -70,7 +71,8 @@ def commands() -> str:
         text=True,
         env={**os.environ, "NO_COLOR": "1"},
     )
-    return told.stdout
+    # What help keeps line by line is code on a page.
+    return re.sub(r"\x08\n(.*:)\n((?:  .*\n)+)", lambda kept: f"{kept[1]}\n\n```sh\n{dedent(kept[2])}```\n", told.stdout)
 
 
 def python(public: str) -> str:

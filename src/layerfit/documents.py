@@ -20,6 +20,9 @@ from typing import Any
 
 from .errors import InputError
 
+EXR = b"\x76\x2f\x31\x01"
+"""What an OpenEXR file begins with."""
+
 MAX_BYTES = 4 * 2**20
 """Scene files and presets are a few kB; anything larger is not one."""
 
@@ -33,9 +36,12 @@ def read_document(path: Path) -> dict[str, Any]:
             raise InputError(f"{path}: more than {MAX_BYTES} bytes are too many for a scene file or a preset")
         text = content.decode()
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}. Check the path and its permissions.") from None
+        raise unreadable(path, error) from None
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); is it another kind of file?") from None
+        what = "an EXR image" if content.startswith(EXR) else f"not UTF-8 text (byte {error.start})"
+        raise InputError(
+            f"{path}: is {what}, where a scene file or a preset is read. `layerfit inspect` says what images hold."
+        ) from None
     try:
         document = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
         json.dumps(
@@ -64,10 +70,18 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """ " (did you mean '...'?)" where something known is close, else nothing."""
-    close = difflib.get_close_matches(word, list(known), 1, 0.5)
+def nearest(word: str, known: Iterable[str], alike: float = 0.5) -> str:
+    """ " (did you mean '...'?)" where something known is close, else nothing; `alike` is from 0 to 1."""
+    close = difflib.get_close_matches(word, list(known), 1, alike)
     return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def unreadable(path: Path, error: OSError) -> InputError:
+    """What is said of a file that cannot be opened; of one that is not there, which of its neighbours may have been meant."""
+    near = ""
+    if isinstance(error, FileNotFoundError) and path.parent.is_dir():
+        near = nearest(path.name, (file.name for file in path.parent.iterdir()), 0.6)
+    return InputError(f"{path}: cannot be read: {error.strerror}{near}. Check the path and its permissions.")
 
 
 def check_keys(document: Any, known: Sequence[str], where: str) -> None:
@@ -86,6 +100,8 @@ def whole(path: Path) -> Iterator[Path]:
     Until then it has no name, so that a process that is killed leaves nothing behind; where the file system cannot do that, a hidden
     one. What is no file, as a pipe or `/dev/stdout`, is written straight. Raises `InputError` where the file cannot be written.
     """
+    if not path.name:
+        raise InputError(f"{path}: cannot be written: it is a directory. Choose another output path, with the name of a file.")
     hidden = path.with_name(f".{uuid.uuid4().hex}{path.suffix[:9]}")
     try:
         if path.exists() and not path.is_file() and not path.is_dir():

@@ -3,6 +3,9 @@
 INTERRUPTED, INTERRUPT_CODE = "layerfit: interrupted; every file that was written is whole", 130
 """What is said after Ctrl-C, and the exit code: 128 and the number of the signal, as shells have it."""
 
+PIPE_CODE = 141
+"""The exit code where whoever reads standard output has gone, by the same rule."""
+
 
 class LayerfitError(Exception):
     """Something outside the program is at fault: an input file, an argument or the machine. Exit code 2, no traceback."""

@@ -12,7 +12,7 @@ from typing import Any
 from .capture.load import AnyView, load
 from .capture.measured.view import MeasuredView
 from .capture.scene import Scene
-from .capture.scene_file import read_scene
+from .capture.scene_file import check_request, read_scene
 from .documents import check_directory, finite, of_ours, write_bytes, write_files
 from .drawings import draw_all, mean_error, quadrature
 from .errors import InputError
@@ -135,8 +135,10 @@ def fit_scene(
 
 
 def asked(scene: Scene, options: Mapping[str, Any]) -> Scene:
-    """The scene with those of its [fit] table that are given otherwise; None is not given."""
-    return dataclasses.replace(scene, fit=dataclasses.replace(scene.fit, **{k: v for k, v in options.items() if v is not None}))
+    """The scene with those of its [fit] table that are given otherwise; None is not given. Raises `InputError`."""
+    given = {key: value for key, value in options.items() if value is not None}
+    check_request(given, f"{scene.path}: fit")
+    return dataclasses.replace(scene, fit=dataclasses.replace(scene.fit, **given))
 
 
 def fit_views(views: Sequence[AnyView], scene: Scene, **options: Any) -> FitResult:

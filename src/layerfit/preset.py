@@ -46,6 +46,10 @@ def read_preset(path: Path | str) -> Stack:
     document = read_document(path)
     where = str(path)
     if document.get("schema") != SCHEMA:
+        if "reference" in document:
+            raise InputError(
+                f"{where}: is a scene file, not a preset. A fit of it leaves one, preset.json; `layerfit presets` lists those that ship."
+            )
         raise InputError(f'{where}: not a preset: "schema" is {document.get("schema")!r} and should be {SCHEMA!r}')
     if document.get("version") != VERSION:
         raise InputError(

@@ -68,6 +68,14 @@ def find_preset(path: Path) -> Path:
     return folder / f"{path.name}.json"
 
 
+def check_not_preset(path: Path) -> None:
+    """Raise `InputError` where the name of a shipped preset stands for a scene file."""
+    if not path.suffix and not path.exists() and (shaders() / "presets" / f"{path.name}.json").is_file():
+        raise InputError(
+            f"{path}: is a preset that ships, not a scene file. A scene starts from it by `--start {path.name}`, or by a preset in its [material]."
+        )
+
+
 def _described(path: Path) -> Shipped:
     document = read_document(path)
     words = {key: document[key] for key in ("name", *WORDS)}

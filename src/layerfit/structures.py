@@ -9,7 +9,7 @@ from typing import Any
 from .capture.load import load
 from .capture.measured.read import is_measured
 from .capture.scene import FitRequest, MeasuredReference, Scene
-from .capture.scene_file import read_scene
+from .capture.scene_file import check_request, read_scene
 from .documents import check_directory, write_files
 from .fit.nuisances import of_the_scene
 from .fit.structures import choose_structure
@@ -57,6 +57,7 @@ def structures_of(
     and are not used. `min_half_deg` is for a measured BRDF that is named itself. Raises `LayerfitError` for input or a machine that is at fault.
     """
     path, directory = Path(path), Path(directory)
+    check_request({"metric": metric, "seed": seed}, f"{path}: fit")
     scene = _scene(path, min_half_deg)
     check_directory(directory)
     searching = lambda stage, share: progress(stage, SEARCH * share)  # noqa: E731

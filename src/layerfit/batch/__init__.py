@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..capture.scene_file import check_request
 from ..documents import check_directory, write_text
 from ..fit import words
 from .cluster import fitted as fitted_on
@@ -60,7 +61,9 @@ def fit_batch(
     """
     directory = Path(directory)
     check_directory(directory)
-    options = {key: value for key, value in options.items() if value is not None} | ({"quick": True} if quick else {})
+    options = {key: value for key, value in options.items() if value is not None}
+    check_request(options, "[fit] of all scenes")
+    options |= {"quick": True} if quick else {}
     tasks = {task.key(): task for task in tasks_of(scenes, directory, each, options)}
     directory.mkdir(parents=True, exist_ok=True)
     journal = Journal(directory / JOURNAL)

@@ -14,6 +14,7 @@ from glob import glob
 from pathlib import Path
 from typing import Any
 
+from ..documents import unreadable
 from ..errors import InputError
 
 
@@ -104,7 +105,7 @@ def _manifest(path: Path) -> Iterator[tuple[Path, dict[str, str]]]:
     try:
         yield from _rows(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}. Check the path and its permissions.") from None
+        raise unreadable(path, error) from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: is not a CSV file in UTF-8 ({error})") from None
 

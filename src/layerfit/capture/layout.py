@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..documents import EXR, unreadable
 from ..errors import InputError
 
 MAX_SIDE = 16384
@@ -23,7 +24,6 @@ MAX_SAMPLES = 2**28
 _MAX_HEADER = 2**26  # bytes: an ID manifest can hold some MiB
 _MAX_ENTRIES = 20_000  # attributes and channels, over all parts: a render writes fewer than 100 a part
 _MAX_BLOCKS = 2**20
-_MAGIC = b"\x76\x2f\x31\x01"
 _OTHER_FORMATS = {b"\x89PNG": "PNG", b"\xff\xd8\xff": "JPEG", b"II*\0": "TIFF", b"MM\0*": "TIFF", b"#?RA": "Radiance HDR"}
 _TILED, _DEEP, _MULTIPART = 0x200, 0x800, 0x1000
 _KNOWN_FLAGS = _TILED | _DEEP | _MULTIPART | 0x400  # 0x400: names of up to 255 bytes
@@ -118,8 +118,7 @@ def read_layout(path: Path) -> list[Layout]:
         str(path).encode()
         fd = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # not to wait for the other end of a pipe
     except OSError as error:
-        what = {FileNotFoundError: "does not exist; check the name", PermissionError: "cannot be read; change its permissions"}
-        raise InputError(f"{path}: {what.get(type(error), f'cannot be read ({error.strerror})')}") from None
+        raise unreadable(path, error) from None
     except ValueError:
         raise InputError(f"{str(path)!a}: the name holds bytes that are not UTF-8, or zeros; rename the file") from None
     try:
@@ -136,7 +135,7 @@ def read_layout(path: Path) -> list[Layout]:
 
 def _read_headers(source: _Source) -> list[Layout]:
     start = os.pread(source.fd, 4, 0)
-    if start != _MAGIC:
+    if start != EXR:
         known = [f"a {name} picture" for magic, name in _OTHER_FORMATS.items() if start.startswith(magic)]
         what = known[0] if known else "not an EXR file" if source.size else "empty"
         raise InputError(f"{source.path}: is {what}; save the render as OpenEXR (linear, half or float)")

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..documents import unreadable
 from ..errors import InputError
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -17,7 +18,7 @@ def read_png(path: Path) -> np.ndarray:
         with path.open("rb") as file:
             signature = file.read(len(SIGNATURE))
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}. Check the path and its permissions.") from None
+        raise unreadable(path, error) from None
     if signature != SIGNATURE:  # the library would try every other kind of picture, and take what it is
         raise InputError(f"{path}: is not a PNG picture, whatever its name; save it as PNG or EXR")
     try:

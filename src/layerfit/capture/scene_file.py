@@ -13,6 +13,7 @@ import numpy as np
 from ..documents import check_keys, nearest, read_document
 from ..errors import InputError
 from ..preset import FORM_KEYS, form_of, read_preset, stack_of
+from ..shipped import check_not_preset
 from ..stack import Stack
 from .scene import (
     AMBIENT,
@@ -46,8 +47,14 @@ MOST_TEXELS = 4096
 def read_scene(path: str | Path, start: Stack | None = None) -> Scene:
     """Read a scene file (TOML or JSON); `start` stands in for its [material] where it has none. Raises `InputError` naming the key at fault."""
     path = Path(path)
+    check_not_preset(path)
     document = read_document(path)
     where = str(path)
+    if "schema" in document:
+        raise InputError(
+            f"{where}: is a {document['schema']}, not a scene file, which says reference, camera, lights and what to fit. "
+            f'A scene starts from a preset by preset = "{path.name}" in its [material].'
+        )
     check_keys(document, ("reference", "geometry", "camera", "light", "material", "fit", "map"), where)
     entries = document.get("reference")
     if entries is None:
@@ -139,18 +146,23 @@ def _fit(table: Any, where: str) -> FitRequest:
     for key in ("free", "also", "each"):
         if key in values:
             values[key] = _names(values[key], f"{where}.{key}")
+    check_request(values, where)
+    if "min_cosine" in values and not 0.0 <= number(values["min_cosine"], f"{where}.min_cosine") < 1.0:
+        raise InputError(f"{where}.min_cosine = {values['min_cosine']!r}: should be from 0 to below 1")
+    if not isinstance(values.get("fixed", {}), Mapping):
+        raise InputError(f"{where}.fixed = {values['fixed']!r}: should be a table of parameters and their values")
+    return FitRequest(**values)
+
+
+def check_request(values: Mapping[str, Any], where: str) -> None:
+    """Raise `InputError` for a choice of a fit that is none: of those that may also be given beside a scene."""
     for key, known in (("loss", LOSSES), ("metric", METRICS)):
         if values.get(key, known[0]) not in known:
             raise InputError(
                 f"{where}.{key} = {values[key]!r}: should be one of {', '.join(known)}{nearest(str(values[key]), known)}"
             )
-    if "min_cosine" in values and not 0.0 <= number(values["min_cosine"], f"{where}.min_cosine") < 1.0:
-        raise InputError(f"{where}.min_cosine = {values['min_cosine']!r}: should be from 0 to below 1")
     for key, (least, most) in (("starts", (1, MOST_STARTS)), ("seed", (0, 2**63 - 1))):
         _check_whole(values.get(key, least), least, most, f"{where}.{key}")
-    if not isinstance(values.get("fixed", {}), Mapping):
-        raise InputError(f"{where}.fixed = {values['fixed']!r}: should be a table of parameters and their values")
-    return FitRequest(**values)
 
 
 def _map(table: Any, where: str) -> MapRequest:

@@ -13,11 +13,13 @@ from .talk import Done, say
 def blender_kit(
     output: Annotated[Path, typer.Option("--output", "-o", help="Script to write.")] = Path("layerfit_kit.py"),
 ) -> Done:
-    """Write a script that renders a reference out of a .blend, with camera, lights and material in files beside it.
+    """Write a script by which Blender renders a reference.
 
+    It renders what a .blend holds, and writes its camera, lights and material to files beside the picture.
     `blender scene.blend --background --python layerfit_kit.py` then renders the active object, and says with which command it is fitted.
 
-    Example: `layerfit blender-kit -o layerfit_kit.py`
+    Examples:
+        layerfit blender-kit -o layerfit_kit.py
     """
     from ..documents import write_text
     from ..interchange.formats import blender_kit as script

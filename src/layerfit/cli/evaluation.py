@@ -14,7 +14,7 @@ from .talk import Done, say, tell
 Tier = Annotated[
     str,
     typer.Option(
-        help="exact (the default), compact, lazanyi, schlick, faithful or tables; or walk, the random walk.",
+        help="exact, compact, lazanyi, schlick, faithful or tables; or walk, the random walk.",
         autocompletion=complete.evaluated,
     ),
 ]
@@ -30,6 +30,8 @@ def _tier(stack: Any, name: str, tier: str, max_error: float | None, paths: int 
     from ..tiers.tier import WALK, make_tier
     from ..walk import PATHS, walked
 
+    if max_error is not None and tier == "exact":
+        raise InputError("--max-error is for --tier compact or tables: the exact form has no error against itself")
     if tier != WALK:
         if paths is not None:
             raise InputError("--paths is for --tier walk: the other tiers walk none")
@@ -48,11 +50,15 @@ def render(
     max_error: MaxError = None,
     paths: Paths = None,
 ) -> Done:
-    """Render a preset in place of a scene's reference: same camera and lights, wherever the object covers a pixel.
+    """Render a preset with the camera and lights of a scene.
+
+    The picture stands in place of the scene's reference, wherever its object covers a pixel.
 
     With `--tier` by another tier of the material; `walk` is the random walk through its layers, the truth, under point and distant lights.
 
-    Example: `layerfit render out/preset.json scene.toml -o copper.exr`
+    Examples:
+        layerfit render out/preset.json scene.toml -o copper.exr
+        layerfit render lacquered_copper scene.toml --tier walk -o truth.png
     """
     from ..cache import use_compilation_cache
 
@@ -78,11 +84,14 @@ def evaluate(
     max_error: MaxError = None,
     paths: Paths = None,
 ) -> Done:
-    """Evaluate the BRDF [1/sr] of a preset at pairs of directions, without the cosine: columns f_r, f_g, f_b.
+    """Evaluate the BRDF of a preset at pairs of directions.
+
+    Values are in 1/sr, without the cosine, in columns f_r, f_g, f_b.
 
     With `--tier walk` by the random walk through its layers, the truth, with standard errors in columns se_r, se_g, se_b.
 
-    Example: `layerfit eval out/preset.json directions.csv -o values.csv`
+    Examples:
+        layerfit eval out/preset.json directions.csv -o values.csv
     """
     from ..documents import write_text
     from ..preset import read_preset

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from . import complete
-from .app import Force, Loss, Metric, Output, Scene, Seed, Starts, check_choice, command
+from .app import Force, Loss, Metric, Output, Scene, Seed, Starts, command
 from .talk import STARTED, Done, many, progress, say, show
 
 TIMES_MORE = 4
@@ -34,6 +34,7 @@ def fit(
         list[str] | None,
         typer.Option(
             "--also",
+            metavar="PARAMETER",
             help="Parameter to fit beside [fit].free, such as light.ambient, in place of the scene's [fit].also; may be repeated.",
         ),
     ] = None,
@@ -41,6 +42,7 @@ def fit(
         list[str] | None,
         typer.Option(
             "--each",
+            metavar="PARAMETER",
             help="Parameter that every reference has for itself, such as base.alpha, in place of the scene's [fit].each; may be repeated.",
         ),
     ] = None,
@@ -48,6 +50,7 @@ def fit(
         list[str] | None,
         typer.Option(
             "--profile",
+            metavar="PARAMETER",
             help="Parameter whose 95 % interval is found by fitting the others again, such as coat.tau; may be repeated.",
         ),
     ] = None,
@@ -58,18 +61,18 @@ def fit(
     Leaves `fit.json`, `preset.json`, `material.frag`, `report.html`, `fit.png` and `trace.csv` in the output directory; no `material.frag`
     where the driver draws the shader otherwise than JAX computes it.
 
-    Example: `layerfit fit examples/references/lacquered_copper.toml -o out/copper`
+    Examples:
+        layerfit fit examples/references/lacquered_copper.toml -o out/copper
+        layerfit fit scene.toml --starts 12 --profile coat.eta -o out
+        layerfit fit scene.toml --start out/preset.json --also light.ambient -o out/again
     """
     from ..cache import use_compilation_cache
 
     use_compilation_cache()
-    from ..capture.scene import LOSSES, METRICS
     from ..capture.scene_file import MOST_STARTS, read_scene
     from ..job import fit_scene
 
     imported = time.perf_counter() - STARTED
-    check_choice(loss, LOSSES, "--loss")
-    check_choice(metric, METRICS, "--metric")
     with progress() as report:
         read = read_scene(scene) if start is None else _starting(scene, start)
         outcome = fit_scene(
@@ -143,25 +146,27 @@ def structures(
         str, typer.Option(help="law, uniform, relative, log or cube_root.", autocompletion=complete.metrics)
     ] = "log",
     min_half_deg: Annotated[
-        float, typer.Option(min=0.0, max=89.0, help="Of a measured BRDF: leave out what is nearer to the mirror direction.")
+        float, typer.Option(min=0.0, max=89.0, help="Degrees, of a measured BRDF: leave out half vectors nearer to the normal.")
     ] = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of starts and pixel choices.")] = 0,
 ) -> Done:
-    """Find out which structure a reference supports: fit candidates, and choose the simplest that explains it.
+    """Find the simplest structure that explains a reference.
+
+    Fits candidates, from a diffuse surface to two coats.
 
     Leaves `structures.json` and `structures.png` in the output directory, beside what a fit of the chosen one leaves. Exit code 1: it
     does not explain the reference, or its fit has findings.
 
-    Example: `layerfit structures paint.bsdf -o out/paint`
+    Examples:
+        layerfit structures paint.bsdf -o out/paint
+        layerfit structures scene.toml --only metal,coat_metal -o out
     """
     from ..cache import use_compilation_cache
 
     use_compilation_cache()
-    from ..capture.scene import METRICS
     from ..report.structures import table
     from ..structures import structures_of
 
-    check_choice(metric, METRICS, "--metric")
     names = None if only is None else [name.strip() for name in only.split(",")]
     with progress() as report:
         outcome = structures_of(
@@ -201,16 +206,15 @@ def batch(
     Leaves `results.csv`, `results.parquet` (where pyarrow is installed) and `batch.json`. What is interrupted goes on where it was when the
     same command is given again. Exit code 1: some failed; their rows say why.
 
-    Example: `layerfit batch "examples/references/*.toml" -o out/batch`
+    Examples:
+        layerfit batch "examples/references/*.toml" -o out/batch
+        layerfit batch captures/ --workers 4 --each -o out/captures
     """
     from ..cache import use_compilation_cache
 
     use_compilation_cache()
     from ..batch import fit_batch
-    from ..capture.scene import LOSSES, METRICS
 
-    check_choice(loss, LOSSES, "--loss")
-    check_choice(metric, METRICS, "--metric")
     with many() as report:
         done = fit_batch(
             scenes,
@@ -255,11 +259,12 @@ def advise(
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for advice.json and advice.png.")] = None,
 ) -> Done:
-    """Say what the images of a scene determine of its material, and which further light, camera or thickness would help most.
+    """Say what the images of a scene tell of its material.
 
-    Exit code 1: something that is free is not determined.
+    And which further light, camera or thickness would tell most. Exit code 1: something that is free is not determined.
 
-    Example: `layerfit advise examples/references/varnished_wood.toml -o out/advice`
+    Examples:
+        layerfit advise examples/references/varnished_wood.toml -o out/advice
     """
     from ..cache import use_compilation_cache
 

@@ -26,11 +26,14 @@ def truth(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of the random walk.")] = 0,
 ) -> Done:
-    """Compare the closed forms with a random walk through the layers: where each can be trusted, for this material.
+    """Compare a preset's form with the random walk.
+
+    Paths of light through its layers are the truth; each closed form is held against them.
 
     Leaves `truth.json` and `truth.png` in the output directory. Exit code 1: the preset's own form is more than 10 % off in the median.
 
-    Example: `layerfit truth lacquered_copper -o out/copper`
+    Examples:
+        layerfit truth lacquered_copper -o out/copper
     """
     from ..cache import use_compilation_cache
 
@@ -63,12 +66,15 @@ def tradeoff(
     ] = None,
     fits: Annotated[bool, typer.Option("--fits/--no-fits", help="Whether fits are timed too: minutes.")] = True,
 ) -> Done:
-    """Measure error against run time: of the shaders that a material can have, against itself and the random walk; and of its fit.
+    """Measure error against run time, of shaders and of fits.
+
+    Of the shaders that a preset can have, against itself and the random walk; and of fits of it.
 
     Leaves `tradeoff.json`, `tradeoff.csv`, `tradeoff.png` and `tradeoff.html` in the output directory. Interrupted, it
     goes on from there when it is asked again.
 
-    Example: `layerfit tradeoff lacquered_copper -o out/copper`
+    Examples:
+        layerfit tradeoff lacquered_copper --no-fits -o out/copper
     """
     from ..cache import use_compilation_cache
 
@@ -105,12 +111,13 @@ def specialise(
     ] = 0.005,
     force: Force = False,
 ) -> Done:
-    """Leave out what one scene does not need of a material: part by part, the rest fitted again.
+    """Leave out what one scene does not need of a material.
 
-    Leaves `preset.json`, `material.frag`, `specialise.json` and `specialise.html` in the output directory. Exit code 1: the
-    shader is not the material.
+    Part by part, and the rest is fitted again. Leaves `preset.json`, `material.frag`, `specialise.json` and `specialise.html` in the output
+    directory. Exit code 1: the shader is not the material.
 
-    Example: `layerfit specialise lacquered_copper examples/references/lacquered_copper.toml --tolerance 0.5% -o out/copper`
+    Examples:
+        layerfit specialise lacquered_copper examples/references/lacquered_copper.toml --tolerance 0.5% -o out/copper
     """
     from ..cache import use_compilation_cache
 
@@ -149,13 +156,14 @@ def stability(
         int, typer.Option(min=0, max=2, help="Materials of a structure whose compact tier and tables are made.")
     ] = Effort.tiers,
 ) -> Done:
-    """Try every structure at the corners of its ranges and at grazing, normal, mirror and retro directions: do the numbers hold?
+    """Try every structure at the corners of its ranges, in float32.
 
-    Values and derivatives in float32 are compared with float64, with 50 digits and with the printed shader. Leaves `stability.json`,
-    `stability.md` and a heat map for each structure in the output directory. Interrupted, it goes on from there when it is asked again. Exit
-    code 1: something is not finite, jumps, or has lost its digits.
+    Directions are grazing, normal, mirror and retro. Values and derivatives in float32 are compared with float64, with 50 digits and with
+    the printed shader. Leaves `stability.json`, `stability.md` and a heat map for each structure in the output directory. Interrupted, it
+    goes on from there when it is asked again. Exit code 1: something is not finite, jumps, or has lost its digits.
 
-    Example: `layerfit stability lambert -o out/stability`
+    Examples:
+        layerfit stability "form qualitative" -o out/stability
     """
     from ..report.stability import table
     from ..stability.sweep import stability_of

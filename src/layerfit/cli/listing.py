@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from .._data import references
 from .app import Output, command
 from .talk import Done, progress, say, tell, tell_table
 
@@ -17,9 +18,12 @@ def presets(
         typer.Argument(help="Part of a name, group, structure or description: copper, wood, flakes. Left out: all of them."),
     ] = "",
 ) -> Done:
-    """List the presets that ship: found by name wherever a preset is asked for.
+    """List the presets that ship.
 
-    Example: `layerfit presets copper`
+    Each is found by its name wherever a preset is asked for.
+
+    Examples:
+        layerfit presets copper
     """
     found = _found(word)
     width = max(len(preset.name) for preset in found)
@@ -31,12 +35,16 @@ def presets(
 
 
 def _found(word: str) -> list[Any]:
+    from ..documents import nearest
     from ..errors import InputError
     from ..shipped import shipped_presets
 
     if found := shipped_presets(word):
         return found
-    raise InputError(f"no shipped preset has {word!r} in its name or description; `layerfit presets` lists all of them")
+    words = {word for preset in shipped_presets() for word in preset.name.split("_")}
+    raise InputError(
+        f"no shipped preset has {word!r} in its name or description{nearest(word, words)}; `layerfit presets` lists all of them"
+    )
 
 
 @command()
@@ -44,11 +52,12 @@ def gallery(
     word: Annotated[str, typer.Argument(help="Part of a name, group, structure or description. Left out: all of them.")] = "",
     output: Annotated[Path, typer.Option("--output", "-o", help="Directory for the page.")] = Path("out/gallery"),
 ) -> Done:
-    """Show the presets that ship as a page of live previews, drawn by their shaders.
+    """Show the presets that ship as a page of live previews.
 
     Leaves `index.html` in the output directory: one file that makes no request.
 
-    Example: `layerfit gallery wood -o out/gallery`
+    Examples:
+        layerfit gallery wood -o out/gallery
     """
     from ..documents import check_directory, write_text
     from ..report.gallery import page
@@ -67,9 +76,13 @@ def metal(
         str | None, typer.Argument(help="Name, symbol or page: copper, Cu, Cu/McPeak. Left out: a list of names.")
     ] = None,
 ) -> Done:
-    """Print `eta` and `k` of a metal in three channels, from its measured optical constants, for a preset or a scene.
+    """Print `eta` and `k` of a metal in three channels.
 
-    Example: `layerfit metal copper`
+    From its measured optical constants, for a preset or a scene.
+
+    Examples:
+        layerfit metal copper
+        layerfit metal Cu/McPeak
     """
     from ..optics.metals import metal as find_metal, metal_names
     from ..preset import rounded
@@ -92,9 +105,12 @@ def metal(
 def inspect(
     file: Annotated[Path, typer.Argument(help="EXR file, or a measured BRDF: .brdf, .bsdf, .binary or .csv.")],
 ) -> Done:
-    """Say what a file holds, what a fit would use of it and why, and what looks wrong: of an EXR, or of a measured BRDF.
+    """Say what a file holds, what a fit would use, what is wrong.
 
-    Example: `layerfit inspect render.exr`
+    Of an EXR, or of a measured BRDF. Exit code 1: something looks wrong.
+
+    Examples:
+        layerfit inspect render.exr
     """
     from ..capture.inspect import inspect as inspect_file
 
@@ -102,6 +118,10 @@ def inspect(
     tell_table(found.render())
     measured = file.suffix.lower() != ".exr"
     good = not any(finding.severity == "warning" for finding in found.findings)
+    if not measured and not file.with_suffix(".toml").exists():
+        say(
+            f"A fit needs a scene file, which says camera, lights and material, such as {references() / 'lacquered_copper.toml'}"
+        )
     return Done(found.to_json(), ("structures", file) if measured else ("fit", file.with_suffix(".toml")), good)
 
 
@@ -109,9 +129,12 @@ def inspect(
 def demo(
     output: Output = Path("out/demo"),
 ) -> Done:
-    """Fit the references that layerfit ships, verify their shaders, and say where the pictures are.
+    """Fit the references that ship, and verify their shaders.
 
-    Example: `layerfit demo -o out/demo`
+    Says where the pictures are.
+
+    Examples:
+        layerfit demo -o out/demo
     """
     from ..cache import use_compilation_cache
 
@@ -127,11 +150,13 @@ def demo(
 
 @command()
 def doctor() -> Done:
-    """Say what is installed and what this machine can do, what each missing thing would give, and the command that gets it.
+    """Say what is installed and what this machine can do.
 
-    Exit code 0: the main job can be done: fit, print, verify. 1: something that it needs is missing.
+    And what each missing thing would give, with the command that gets it. Exit code 0: the main job can be done: fit, print, verify. 1:
+    something that it needs is missing.
 
-    Example: `layerfit doctor`
+    Examples:
+        layerfit doctor
     """
     from ..doctor import examine
 

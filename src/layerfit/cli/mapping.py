@@ -19,12 +19,17 @@ def map_texels(
         list[str] | None,
         typer.Option(
             "--free",
+            metavar="PARAMETER",
             help="Parameter that every texel has for itself, such as coat.thickness_um or tilt, in place of the scene's [map].free; may be repeated.",
         ),
     ] = None,
     shared: Annotated[
         list[str] | None,
-        typer.Option("--shared", help="Parameter that is one for all texels, and fitted to all images first; may be repeated."),
+        typer.Option(
+            "--shared",
+            metavar="PARAMETER",
+            help="Parameter that is one for all texels, and fitted to all images first; may be repeated.",
+        ),
     ] = None,
     smooth: Annotated[
         float | None,
@@ -35,13 +40,14 @@ def map_texels(
     ] = None,
     starts: Starts = None,
 ) -> Done:
-    """Fit parameters texel by texel to images of one object under several lights.
+    """Fit parameters texel by texel, to images of several lights.
 
-    Leaves `maps.exr` (values, sigmas, flags), `textures/`, `material.frag`, which reads them, `map.png`, `preset.json` and `map.json` in the output
-    directory. What is interrupted goes on where it was when the same command is given again. Exit code 1: a parameter is not told in most texels,
-    or there is no shader.
+    Leaves `maps.exr` (values, sigmas, flags), `textures/`, `material.frag`, which reads them, `map.png`, `preset.json` and `map.json` in
+    the output directory. What is interrupted goes on where it was when the same command is given again. Exit code 1: a parameter is not
+    told in most texels, or there is no shader.
 
-    Example: `layerfit map panel.toml --free coat.thickness_um -o out/panel`
+    Examples:
+        layerfit map panel.toml --free coat.thickness_um -o out/panel
     """
     from ..cache import use_compilation_cache
 
@@ -88,12 +94,14 @@ def study(
     ],
     output: Output = Path("out"),
 ) -> Done:
-    """Vary a material, its reference or its fit by a design, and measure each point.
+    """Vary a material or its fit by a design, and measure.
 
-    Leaves `study.nc` (xarray), `study.csv` and, with matplotlib, `study.png` in the output directory. What is interrupted goes on where it
-    was when the same command is given again. Exit code 1: some trials failed; `study.csv` says why.
+    What varies may be of the material, of its reference, or of the fit. Leaves `study.nc` (xarray), `study.csv` and, with matplotlib,
+    `study.png` in the output directory. What is interrupted goes on where it was when the same command is given again. Exit code 1: some
+    trials failed; `study.csv` says why.
 
-    Example: `layerfit study depth.toml -o out/depth`
+    Examples:
+        layerfit study depth.toml -o out/depth
     """
     from ..cache import use_compilation_cache
 

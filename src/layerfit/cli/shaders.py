@@ -13,7 +13,10 @@ from .talk import Done, finish, say, tell
 @command()
 def export(
     preset: Preset,
-    target: Annotated[str, typer.Option(help="glsl330 or essl300.", autocompletion=complete.targets)] = "glsl330",
+    target: Annotated[
+        str | None,
+        typer.Option(help="glsl330 or essl300, of WebGL2; left out, glsl330.", autocompletion=complete.targets),
+    ] = None,
     uniforms: Annotated[
         bool, typer.Option("--uniforms", help="Parameters as uniforms, for live tuning, not as constants.")
     ] = False,
@@ -42,21 +45,23 @@ def export(
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; left out, standard output.")] = None,
 ) -> Done:
-    """Print the shader of a preset; or, with `--to`, the material that another program comes nearest to it with.
+    """Print the shader of a preset, or another program's material.
 
-    Then the values are found that look most like it. What is lost is measured, said, and stored in the preset.
+    With `--to` the values are found with which that program comes nearest to the preset. What is lost is measured, said, and stored in
+    the preset.
 
-    Example: `layerfit export out/preset.json --target essl300 -o copper.frag`
-
-    Example: `layerfit export out/preset.json --to gltf -o copper.gltf`
+    Examples:
+        layerfit export out/preset.json --target essl300 -o copper.frag
+        layerfit export out/preset.json --max-error 0.01 -o cheap.frag
+        layerfit export out/preset.json --to gltf -o copper.gltf
     """
     from ..documents import nearest
     from ..errors import InputError
 
     if to is not None:
-        if uniforms or any(option is not None for option in (tier, max_error, max_cost, entries)):
+        if uniforms or any(option is not None for option in (target, tier, max_error, max_cost, entries)):
             raise InputError(
-                "--uniforms, --tier, --max-error, --max-cost and --entries are of the shader: leave them out, or --to"
+                "--target, --uniforms, --tier, --max-error, --max-cost and --entries are of the shader: leave them out, or --to"
             )
         return _export_to(preset, to, scene, output)
     if scene is not None:
@@ -64,6 +69,7 @@ def export(
     from ..preset import read_preset
     from ..shader.export import HEADERS, print_material
 
+    target = target or "glsl330"
     if target not in HEADERS:
         raise InputError(f"--target {target}: should be one of {', '.join(HEADERS)}{nearest(target, HEADERS)}")
     stack = read_preset(preset)
@@ -135,12 +141,20 @@ def verify(
     preset: Preset,
     scene: Annotated[Path | None, typer.Argument(help="Scene file: also compare pixels with its references.")] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the picture strip.")] = None,
-    fail: Annotated[float | None, typer.Option(help="Relative difference from JAX that p99.9 of the values may have.")] = None,
-    hardfail: Annotated[float | None, typer.Option(help="Relative difference from JAX that any value may have.")] = None,
+    fail: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Relative difference from JAX that p99.9 of the values may have; left out, 1e-5."),
+    ] = None,
+    hardfail: Annotated[
+        float | None, typer.Option(min=0.0, help="Relative difference from JAX that any value may have; left out, 5e-5.")
+    ] = None,
 ) -> Done:
-    """Render the printed shader of a preset in OpenGL and compare it with JAX, number by number, and with references.
+    """Render a preset's shader in OpenGL and compare it with JAX.
 
-    Example: `layerfit verify out/preset.json scene.toml -o out`
+    Number by number; with a scene, pixels are compared with its references too. Exit code 1: the shader is not the material.
+
+    Examples:
+        layerfit verify out/preset.json scene.toml -o out
     """
     from ..cache import use_compilation_cache
 
@@ -171,12 +185,15 @@ def view(
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
     window: Annotated[bool, typer.Option("--window", help="In a window of its own, without a browser.")] = False,
 ) -> Done:
-    """Look at a preset live and tune it: its exported shader in the browser, with a slider for every parameter.
+    """Look at a preset live, with a slider for every parameter.
 
-    The page is served to this machine alone, until Ctrl+C; with `-o` it is a file to keep or to send. It can save the tuned preset. With
-    `--window` (pip install 'layerfit[window]') a window has the same: drag, or move the sliders by keys.
+    Its exported shader draws in the browser. The page is served to this machine alone, until Ctrl+C; with `-o` it is a file to keep or to
+    send. It can save the tuned preset. With `--window` (pip install 'layerfit[window]') a window has the same: drag, or move the sliders by
+    keys.
 
-    Example: `layerfit view lacquered_copper`
+    Examples:
+        layerfit view lacquered_copper
+        layerfit view out/preset.json -o copper.html
     """
     from ..cache import use_compilation_cache
 

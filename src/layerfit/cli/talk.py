@@ -16,7 +16,7 @@ from typing import Any
 
 from rich.console import Console
 
-from ..errors import InputError
+from ..errors import PIPE_CODE, InputError
 
 STARTED = time.perf_counter()
 
@@ -76,14 +76,14 @@ def tell_table(table: Any) -> None:
 
 
 def _put(text: str) -> None:
-    """Data on standard output. Raises `InputError` where that is a file on a full disk."""
+    """Data on standard output. Ends the program where nobody reads on; raises `InputError` where that is a file on a full disk."""
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
-    except BrokenPipeError:  # whoever reads has read enough
-        raise
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left of it would be tried again at the exit
+        if isinstance(error, BrokenPipeError):  # whoever reads has read enough, as `head` has
+            raise SystemExit(PIPE_CODE) from None
         raise InputError(f"standard output: cannot be written: {error.strerror}. Send it to another place.") from None
 
 

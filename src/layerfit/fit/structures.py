@@ -158,7 +158,7 @@ def _asked(known: list[Candidate], names: Sequence[str] | None, views: Sequence[
     by_name = {candidate.name: candidate for candidate in known}
     for name in names:
         if name not in by_name:
-            raise InputError(f"structure {name!r} is not one of {', '.join(by_name)}{nearest(name, by_name)}")
+            raise InputError(f"structure {name!r}: should be one of {', '.join(by_name)}{nearest(name, by_name)}")
     return [candidate for candidate in known if candidate.name in names]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from .. import preset as presets
 from .._data import shaders
-from ..documents import MAX_BYTES, nearest, read_document, write_text
+from ..documents import MAX_BYTES, nearest, read_document, unreadable, write_text
 from ..errors import InputError
 from ..preset import SCHEMA as PRESET, preset_of, read_preset
 from ..shipped import find_preset
@@ -79,7 +79,10 @@ def export_to(preset: Path, name: str, scene: Path | None = None, output: Path |
     """
     if name not in FORMATS:
         raise InputError(f"--to {name}: should be one of {', '.join(FORMATS)}{nearest(name, FORMATS)}")
-    chosen, stack = FORMATS[name], read_preset(preset)
+    chosen = FORMATS[name]
+    if output is not None and output.suffix != chosen.ending and output.suffix in {other.ending for other in FORMATS.values()}:
+        raise InputError(f"{output}: --to {name} writes a file that ends in {chosen.ending}")
+    stack = read_preset(preset)
     found = convert(stack, identifier(preset.stem), chosen.dialect, None if scene is None else scene_views(scene))
     text = chosen.write(found)
     drawn = chosen.drawn(found, text)
@@ -150,7 +153,7 @@ def _bytes(path: Path) -> bytes:
             raise InputError(f"{path}: {path.stat().st_size} bytes are too many for a material; {MOST_BYTES} are read at most")
         return path.read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}. Check the path and its permissions.") from None
+        raise unreadable(path, error) from None
 
 
 def blender_kit() -> str:

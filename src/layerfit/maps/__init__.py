@@ -13,7 +13,7 @@ import numpy as np
 
 from ..capture.load import load
 from ..capture.scene import Scene
-from ..capture.scene_file import read_scene
+from ..capture.scene_file import check_request, read_scene
 from ..documents import check_directory, nearest
 from ..errors import InputError
 from ..fit.fit import fit
@@ -67,6 +67,9 @@ def fit_map(
     smooth, size = asked.smooth if smooth is None else smooth, asked.size if size is None else size
     starts = asked.starts if starts is None else starts
     where = f"{scene.path}: map"
+    check_request({"starts": starts}, where)
+    if both := set(free or ()).intersection(shared):
+        raise InputError(f"{where}: {min(both)} is both free and shared: it varies over the object, or is one for all of it")
     scene = dataclasses.replace(scene, start=with_fixed(scene.start, scene.fit.fixed, f"{scene.path}: fit.fixed"))
     mapped(scene.start, free, f"{where}.free")  # before anything is read
     with jax.enable_x64(True):

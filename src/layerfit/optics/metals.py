@@ -154,7 +154,9 @@ def _find(name: str, where: str) -> tuple[str, str]:
     folded = {book.lower(): book for book in books} | NAMES
     book = word if word in books else folded.get(word.strip().lower())
     if book is None:
-        raise InputError(f"{where} = {name!r} is not known{_near(word, (*NAMES, *NAMES.values(), *books))}")
+        raise InputError(
+            f"{where} = {name!r} is not known{_near(word, (*NAMES, *NAMES.values(), *books))}. `layerfit metal` lists names"
+        )
     shelf = books[book]
     pages = _database().pages(shelf, book)
     if page and page not in pages:
@@ -171,7 +173,7 @@ def _find(name: str, where: str) -> tuple[str, str]:
 def _near(word: str, known: Any) -> str:
     folded = {other.lower(): other for other in reversed(list(known))}
     close = difflib.get_close_matches(word.lower(), folded, 3, 0.6)
-    return f"; near are {', '.join(folded[c] for c in close)}" if close else ". `layerfit metal` lists those that are"
+    return f"; near are {', '.join(folded[c] for c in close)}" if close else ""
 
 
 def _tables(entry: Any) -> list[tuple[np.ndarray, np.ndarray]]:

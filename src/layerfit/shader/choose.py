@@ -4,7 +4,7 @@ import dataclasses
 
 from ..errors import InputError
 from ..stack import Stack
-from ..tiers.tier import TIERS, Tier, make_tier
+from ..tiers.tier import TIERS, Tier, check_max_error, make_tier
 from .cost import instructions, phong
 from .export import Shader, print_material
 
@@ -29,6 +29,7 @@ def choose_tier(stack: Stack, name: str, max_error: float | None = None, max_cos
     Costs are SPIR-V instructions after spirv-opt -O, in times of Phong: the same on every machine. Raises `InputError` where no tier
     meets what is asked, and `MachineError` without the tools that count.
     """
+    check_max_error(max_error)
     choices, left_out = [], []
     for tier_name in TIERS:
         try:

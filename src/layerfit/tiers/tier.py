@@ -45,6 +45,12 @@ class Tier:
         return getattr(self.stack.base, "table_bytes", 0)
 
 
+def check_max_error(max_error: float | None) -> None:
+    """Raise `InputError` for an error that nothing can be within."""
+    if max_error is not None and not max_error > 0.0:
+        raise InputError(f"a largest error of {max_error:g}: it should be above 0, such as 0.01")
+
+
 def make_tier(stack: Stack, name: Name = "compact", max_error: float | None = None, entries: int | None = None) -> Tier:
     """A tier of a material; `compact` has degrees as low as `max_error` allows (1e-4).
 
@@ -58,8 +64,7 @@ def make_tier(stack: Stack, name: Name = "compact", max_error: float | None = No
         )
     if name not in TIERS:
         raise InputError(f"tier {name!r}: should be one of {', '.join(TIERS)}{nearest(name, TIERS)}")
-    if max_error is not None and not max_error > 0.0:
-        raise InputError(f"a largest error of {max_error:g}: it should be above 0")
+    check_max_error(max_error)
     if name == "compact":
         made = compact(stack, MAX_ERROR if max_error is None else max_error)
         if isinstance(made, str):

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...documents import unreadable
 from ...errors import InputError
 
 MOST_BYTES = 2**30
@@ -108,4 +109,4 @@ def read_bytes(path: Path) -> bytes:
             raise InputError(f"{path}: {size} bytes are too many for a measured BRDF; {MOST_BYTES} are read at most")
         return path.read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}. Check the path and its permissions.") from None
+        raise unreadable(path, error) from None

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...documents import unreadable
 from ...errors import InputError
 from .data import MeasuredBrdf, measured
 
@@ -43,7 +44,7 @@ def read_columns(path: Path, columns: Sequence[str]) -> np.ndarray:
                 except (TypeError, ValueError):
                     raise InputError(f"{path}: line {reader.line_num}: a number is missing or is none") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise unreadable(path, error) from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: is not a CSV file in UTF-8 ({error})") from None
     return np.array(rows, float).reshape(-1, len(columns))
