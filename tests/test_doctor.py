@@ -115,3 +115,17 @@ def test_a_browser_is_looked_for(monkeypatch, there):
 
     monkeypatch.setattr(doctor.webbrowser, "get", get)
     assert doctor._browser().there is there
+
+
+def test_a_browser_that_is_no_program_is_missing(monkeypatch):
+    monkeypatch.setattr(doctor.webbrowser, "get", lambda: doctor.webbrowser.GenericBrowser("nosuch"))
+    found = doctor._browser()
+    assert not found.there
+    assert (found.found, found.fix) == ("there is no program nosuch", "unset BROWSER")
+
+
+@pytest.mark.parametrize(("name", "there"), [("", False), (":7", True)])
+def test_a_display_is_looked_for(monkeypatch, name, there):
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", name)
+    assert doctor._display().there is there

@@ -2,6 +2,7 @@
 
 import dataclasses
 import errno
+import os
 import platform
 import re
 import shutil
@@ -32,8 +33,8 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
 """Extras of the package: the packages that each brings, and what these give."""
 
 TOOLS: dict[str, tuple[str, str]] = {
-    "glslangValidator": ("glslang-tools", "instructions counted (`tradeoff`, `export --max-cost`)"),
-    "spirv-opt": ("spirv-tools", "instructions counted (`tradeoff`, `export --max-cost`)"),
+    "glslangValidator": ("glslang-tools", "instructions counted (`tradeoff`, `export --max-error` and `--max-cost`)"),
+    "spirv-opt": ("spirv-tools", "instructions counted (`tradeoff`, `export --max-error` and `--max-cost`)"),
 }
 """Programs that some commands call: the Debian package of each, and what it gives."""
 
@@ -54,7 +55,7 @@ class Finding:
     """One thing that was looked at."""
 
     group: str
-    """python, jax, opengl, cache, browser, extra or tool."""
+    """python, jax, opengl, cache, browser, display, extra or tool."""
     name: str
     there: bool
     found: str
@@ -116,7 +117,7 @@ def machine() -> str:
 
 def examine() -> Examination:
     """Look at the machine. Draws one pixel in OpenGL and starts JAX; writes nothing."""
-    return Examination((*_packages(), _jax(), *_opengl(), _cache(), _browser(), *_extras(), *_tools()))
+    return Examination((*_packages(), _jax(), *_opengl(), _cache(), _browser(), _display(), *_extras(), *_tools()))
 
 
 def _packages() -> Iterator[Finding]:
@@ -234,7 +235,19 @@ def _browser() -> Finding:
     except webbrowser.Error:
         found = "no browser, or no display to open one on"
         return Finding("browser", "", False, found, gives=gives, fix="layerfit view PRESET -o page.html, to open elsewhere")
-    return Finding("browser", "", True, getattr(browser, "name", type(browser).__name__), gives=gives)
+    name = getattr(browser, "name", type(browser).__name__)
+    if (
+        isinstance(browser, webbrowser.GenericBrowser) and shutil.which(name) is None
+    ):  # as BROWSER asks, which nobody has looked for
+        return Finding("browser", "", False, f"there is no program {name}", gives=gives, fix="unset BROWSER")
+    return Finding("browser", "", True, name, gives=gives)
+
+
+def _display() -> Finding:
+    gives = "`layerfit view --window` has a place to open"
+    name = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY")
+    found = name or "neither DISPLAY nor WAYLAND_DISPLAY names one"
+    return Finding("display", "", bool(name), found, gives=gives, fix="export DISPLAY=:0, where a desktop runs")
 
 
 def _extras() -> Iterator[Finding]:
