@@ -168,6 +168,30 @@ def test_pictures_are_compared_pixel_by_pixel(report, pair):
     left, right = (evaluated(report, colour, [x, 10])[:3] for x in (3, 27))
     np.testing.assert_allclose(left, 255.0 * display(pair.reference[10, 3], 1.5), atol=1.0)
     np.testing.assert_allclose(right, 255.0 * display(pair.fit[10, 27], 1.5), atol=1.0)
+    at_line = evaluated(report, colour, [23, 10])[:3]  # the first right of the line
+    np.testing.assert_allclose(at_line, 255.0 * display(pair.fit[10, 23], 1.5), atol=1.0, err_msg="the line hides a pixel")
+
+
+def test_the_line_between_pictures_is_a_slider_for_keys(report):
+    swept = report.locator("[data-compare] canvas").first
+    swept.focus()
+    for key, at in (("Home", "0"), ("ArrowRight", "2"), ("End", "100"), ("ArrowLeft", "98")):
+        report.keyboard.press(key)
+        assert (swept.get_attribute("role"), swept.get_attribute("aria-valuenow")) == ("slider", at)
+
+
+def test_a_stage_says_what_it_waits_for(browser, tmp_path):
+    path = tmp_path / "view.html"
+    path.write_text(view.page(read_preset("bare_concrete"), "bare_concrete"))
+    said = "getComputedStyle(document.querySelector('.stage'), '::before').content"
+    with opened(browser, path.as_uri()) as page:
+        page.evaluate("Object.assign(layerfit.views[0], { limit: 0 }).change()")
+        page.evaluate("document.querySelector('.stage').classList.add('waiting')")
+        assert "compiled" in page.evaluate(said)
+        page.evaluate("({ style }) => { style.width = style.height = '40px'; }", page.locator(".stage canvas").element_handle())
+        page.evaluate("layerfit.views[0].change({ limit: 1 })")
+        until(page, "layerfit.views[0].passes === 1")
+        until(page, f"{said} === 'none'")
 
 
 def test_a_view_comes_back_after_its_driver(browser, tmp_path):
@@ -302,3 +326,15 @@ def test_a_phone_shows_a_long_name_without_scrolling_across(browser, tmp_path):
         page.evaluate("layerfit.views[0].limit = 0")
         page.set_viewport_size({"width": 360, "height": 740})
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
+
+
+def test_paper_has_all_of_the_words_and_the_picture(report):
+    report.emulate_media(media="print", color_scheme="dark")
+    try:
+        assert report.locator(".stage canvas").is_visible()
+        assert not report.locator(".track").first.is_visible()
+        assert evaluated(report, "() => [...document.querySelectorAll('pre')].every((e) => e.scrollWidth <= e.clientWidth)")
+        assert evaluated(report, "() => getComputedStyle(document.querySelector('.stage'), null).printColorAdjust") == "exact"
+        assert evaluated(report, "() => getComputedStyle(document.documentElement).backgroundColor") == "rgb(250, 250, 250)"
+    finally:
+        report.emulate_media(media="screen", color_scheme="light")

@@ -35,7 +35,8 @@ function compare(place, data, bytes) {
   const state = { split: 0.5, exposure: 0, top: data.scale, channel: 0 };
   const canvases = [0, 1].map(() => element("canvas", { width, height, tabIndex: 0, role: "img" }));
   const [swept, differing] = canvases;
-  swept.setAttribute("aria-label", `${data.name}: reference left, fit right of the line; arrow keys move it`);
+  for (const [key, value] of Object.entries({ role: "slider", "aria-valuemin": 0, "aria-valuemax": 100, "aria-label": `${data.name}: reference left, fit right of the line; arrow keys move it` })) swept.setAttribute(key, value);
+  const swipe = element("div", { className: "swipe" }, swept);  // the line lies over it: a pixel of a small picture is wide
   differing.setAttribute("aria-label", `${data.name}: fit less reference in false colours`);
   const said = element("output", { className: "said", textContent: "Point at a pixel to read it." });
 
@@ -51,20 +52,27 @@ function compare(place, data, bytes) {
     const edge = Math.round(state.split * width);
     paint(swept, (k, n) => {
       const from = n % width < edge ? reference : fit;
-      return n % width === edge ? [255, 255, 255] : [0, 1, 2].map((c) => encoded(gain * from[k + c]));
+      return [0, 1, 2].map((c) => encoded(gain * from[k + c]));
     });
   };
   const drawDifference = () => paint(differing, (k, n) => (compared[n] ? ramp(data.ramp, 0.5 + 0.5 * error(k) / state.top) : [77, 77, 77]));
 
-  const split = (x) => { state.split = clamp(x, 0, 1); draw(); };
+  const split = (x) => {
+    state.split = clamp(x, 0, 1);
+    swipe.style.setProperty("--at", state.split);
+    swept.setAttribute("aria-valuenow", Math.round(100 * state.split));
+    draw();
+  };
   const pixelAt = (event) => {
     const box = event.target.getBoundingClientRect();
     return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
   };
-  swept.addEventListener("pointermove", (event) => split(pixelAt(event)[0]));
-  swept.addEventListener("keydown", ({ key }) => {
-    if (key === "ArrowLeft") split(state.split - 0.02);
-    if (key === "ArrowRight") split(state.split + 0.02);
+  for (const name of ["pointerdown", "pointermove"]) swept.addEventListener(name, (event) => split(pixelAt(event)[0]));
+  swept.addEventListener("keydown", (event) => {
+    const to = { ArrowLeft: state.split - 0.02, ArrowRight: state.split + 0.02, Home: 0, End: 1 }[event.key];
+    if (to === undefined) return;
+    event.preventDefault();
+    split(to);
   });
   canvases.forEach((canvas) => canvas.addEventListener("pointermove", (event) => {
     const [x, y] = pixelAt(event).map((t, k) => clamp(Math.floor(t * [width, height][k]), 0, [width, height][k] - 1));
@@ -85,12 +93,12 @@ function compare(place, data, bytes) {
   bar.getContext("2d").putImageData(line, 0, 0);
   place.append(
     element("div", { className: "pair" },
-      element("figure", {}, swept, element("figcaption", { className: "ends" }, element("span", { textContent: "reference" }), element("span", { textContent: "fit (its shader)" }))),
+      element("figure", {}, swipe, element("figcaption", { className: "ends" }, element("span", { textContent: "reference" }), element("span", { textContent: "fit (its shader)" }))),
       element("figure", {}, differing, element("figcaption", {}, bar, ends))),
     element("div", { className: "look" }, range("exposure", -6, 6, 0, (x) => { state.exposure = x; draw(); }), range("end of the scale, 2^", -5, 5, 0, rescale),
       choice("difference of", CHANNELS, (k) => { state.channel = k; drawDifference(); })),
     said,
   );
-  draw();
+  split(0.5);
   rescale(0);
 }

@@ -186,8 +186,10 @@ function viewer(place, renderer, data) {
     range("key light", 0, 3, 1, (x) => { view.shares.key = x; view.change(); }),
     range("soft boxes", 0, 3, 1, (x) => { view.shares.studio = x; view.change(); }),
   );
+  const stage = element("div", { className: "stage waiting" }, canvas, sun);
+  view.ondrawn = () => stage.classList.remove("waiting");
   place.append(
-    element("div", { className: "stage" }, canvas, sun),
+    stage,
     element("div", { className: "controls" }, look, element("div", { className: "buttons" }, back, save), ...groups.values()),
   );
   // Numbers of the sliders by the names of their parameters, and back; `ontuned` is called where a user has moved one.
