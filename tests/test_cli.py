@@ -387,7 +387,11 @@ def test_an_inspection(scene):
     assert [c["name"] for c in document["channels"]] == ["A", "B", "G", "R"]
     table = layerfit("inspect", scene.parent / "reference.exr")
     assert "R, G, B" in table.out
-    assert table.err.startswith("Next: layerfit fit ")
+    hint, last = table.err.splitlines()
+    assert Path(hint.split()[-1]).is_file(), "a scene file to begin from: there is none beside the render"
+    assert last.startswith("Next: layerfit fit ")
+    shipped = layerfit("inspect", references() / "lacquered_copper.exr")
+    assert shipped.err.startswith("Next: layerfit fit ")
 
 
 def test_a_shipped_reference_by_the_process_itself(gl, tmp_path):
@@ -437,6 +441,14 @@ def test_a_closed_pipe_is_no_fault(scene):
         ran.stdout.close()
         assert ran.stderr.read() == b""
     assert ran.returncode == PIPE_CODE
+
+
+def test_closed_standard_output_is_said():
+    ran = subprocess.run(
+        f"exec {sys.executable} -m layerfit presets wood >&-", shell=True, stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert ran.returncode == 2
+    assert ran.stderr.startswith("layerfit: standard output is closed")
 
 
 @pytest.mark.parametrize("arguments", [["presets", "wood"], ["presets", "wood", "--json"]])

@@ -319,13 +319,17 @@ def test_a_view_can_be_a_file(tmp_path):
     assert (tmp_path / "concrete.html").read_text().startswith("<!doctype html>")
 
 
-def test_a_phone_shows_a_long_name_without_scrolling_across(browser, tmp_path):
+def test_a_phone_shows_a_long_name_and_the_picture_beside_the_sliders(browser, tmp_path):
     path = tmp_path / "page.html"
-    path.write_text(view.page(read_preset("bare_concrete"), "metallic_blue_car_paint"))
+    path.write_text(view.page(read_preset("metallic_blue_car_paint"), "metallic_blue_car_paint"))
     with opened(browser, path.as_uri()) as page:
         page.evaluate("layerfit.views[0].limit = 0")
         page.set_viewport_size({"width": 360, "height": 740})
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        page.locator("fieldset input").last.scroll_into_view_if_needed()
+        stage = page.locator(".stage").bounding_box()
+        assert stage["y"] == 0.0, "the picture is in sight of the sliders"
+        assert stage["height"] < 0.5 * 740
 
 
 def test_paper_has_all_of_the_words_and_the_picture(report):

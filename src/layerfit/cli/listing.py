@@ -98,7 +98,7 @@ def metal(
     say(f"three channels instead of the spectrum: off by at most {found.max_error:.2g}, delta E 2000 {found.delta_e:.2g}")
     say(f"from {found.source}")
     document |= {"source": found.source, "max_error": found.max_error, "delta_e": found.delta_e}
-    return Done({"name": name, **document}, ("fit", "scene.toml"))
+    return Done({"name": name, **document}, ("presets", "metal"))
 
 
 @command()

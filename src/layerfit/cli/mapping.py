@@ -70,7 +70,7 @@ def _lines(document: dict[str, Any]) -> list[str]:
     """What came of each parameter, and of the shader."""
     height, width = document["size"]
     lines = [
-        f"{document['texels']} texels of {width} x {height}, {document['references']} references, relative L2 {document['error']['rel_l2']:.4f}"
+        f"{document['texels']} texels of {width} x {height}, of {document['references']} images, relative L2 {document['error']['rel_l2']:.4f}"
     ]
     for name, row in document["parameters"].items():
         low, middle, high = row["quartiles"]

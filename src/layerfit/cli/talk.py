@@ -76,7 +76,11 @@ def tell_table(table: Any) -> None:
 
 
 def _put(text: str) -> None:
-    """Data on standard output. Ends the program where nobody reads on; raises `InputError` where that is a file on a full disk."""
+    """Data on standard output. Ends the program where nobody reads on; raises `InputError` where that is closed, or a file on a full disk."""
+    if sys.stdout is None:  # closed, as by >&-
+        raise InputError(
+            "standard output is closed: there is nowhere to write the result to. Send it to a file, or to /dev/null."
+        )
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
