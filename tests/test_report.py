@@ -115,13 +115,20 @@ def page_of(name: str, document: dict) -> str:
     return page(name, document, [], b"", [(0.1, "coarse", 0, 1.0)], "", {})
 
 
+def test_a_column_that_holds_nothing_is_left_out():
+    row = {"value": 0.1, "sigma": 0.01, "start": 0.3, "unit": "1"}
+    assert re.findall("<th>(.*?)</th>", table({"coat.alpha": row})) == ["parameter", "value", "sigma", "start", "coat.alpha"]
+    heads = re.findall("<th>(.*?)</th>", table({"coat.alpha": row, "coat.depth": row | {"unit": "um", "corrected": 0.11}}))
+    assert heads[:6] == ["parameter", "value", "sigma", "unit", "corrected", "start"]
+
+
 def test_the_page_says_what_the_terminal_says():
     text = page_of("<name>", DOCUMENT)
     assert "&lt;name&gt;" in text
     assert "The model misses 23 % of the image." in text
     assert SIGMA in text.split("[[Fit]]")[0], "beside the table, not only in the lines below it"
     assert "The model misses" not in page_of("", DOCUMENT | {"flags": []})
-    assert "<td>&plusmn; –</td>" in table(DOCUMENT["parameters"])
+    assert "<td>± –</td>" in table(DOCUMENT["parameters"])
     assert "<td>um</td>" in table(DOCUMENT["parameters"])
 
 

@@ -44,9 +44,12 @@ def _line(name: str, row: Mapping[str, Any]) -> str:
 
 
 def table(rows: Mapping[str, Mapping[str, Any]]) -> str:
-    """The same as an HTML table."""
-    heads = "".join(f"<th>{head}</th>" for head in ("parameter", "value", "sigma", "unit", "corrected", "start", ""))
-    return f"<table><tr>{heads}</tr>{''.join(_row(name, row) for name, row in rows.items())}</table>"
+    """The same as an HTML table; a column that holds nothing is left out."""
+    lines = [_cells(name, row) for name, row in rows.items()]
+    kept = [k for k, column in enumerate(zip(*lines, strict=True)) if any(column)]
+    heads = "".join(f"<th>{HEADS[k]}</th>" for k in kept)
+    body = "".join(f"<tr>{''.join(KINDS[k].format(html.escape(line[k])) for k in kept)}</tr>" for line in lines)
+    return f"<table><tr>{heads}</tr>{body}</table>"
 
 
 def remarks(
@@ -82,12 +85,16 @@ def _cell(row: Mapping[str, Any], name: str) -> str:
     return "" if value is None else str(value)
 
 
-def _row(name: str, row: Mapping[str, Any]) -> str:
+HEADS = ("parameter", "value", "sigma", "unit", "corrected", "start", "")
+KINDS = ("<th>{}</th>", *["<td>{}</td>"] * 4, "<td class=soft>{}</td>", "<td>{}</td>")
+"""Of the cells below them."""
+
+
+def _cells(name: str, row: Mapping[str, Any]) -> list[str]:
     value, sigma = measured(row["value"], row["sigma"])
-    cells = f"<th>{html.escape(name)}</th><td>{value}</td><td>&plusmn; {sigma}</td><td>{html.escape(_unit(row))}</td>"
     start = number(row["start"]) if "start" in row else ""
     corrected = measured(row["corrected"], row["sigma"])[0] if "corrected" in row else ""
-    return f"<tr>{cells}<td>{corrected}</td><td class=soft>{start}</td><td>{html.escape(', '.join(states(row)))}</td></tr>"
+    return [name, value, f"\u00b1 {sigma}", _unit(row), corrected, start, ", ".join(states(row))]
 
 
 def _unit(row: Mapping[str, Any], before: str = "") -> str:
