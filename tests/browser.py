@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from chromium import FLAGS, executable
 
@@ -46,6 +47,19 @@ def until(page: Any, expression: str) -> None:
             return
         page.wait_for_timeout(50)
     pytest.fail(f"{expression} has not become so in half a minute")
+
+
+MIDDLE = """(view) => {
+    const seen = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+    seen.drawImage(view.canvas, view.canvas.width >> 1, view.canvas.height >> 1, 1, 1, 0, 0, 1, 1);
+    return Array.from(seen.getImageData(0, 0, 1, 1).data);
+}"""
+
+
+def middle(page: Any, view: str) -> np.ndarray:
+    """The colour in the middle of a viewer's picture, when it is whole."""
+    until(page, f"{view}.passes >= {view}.limit")
+    return np.array(page.evaluate(f"({MIDDLE})({view})")[:3])
 
 
 def evaluated(page: Any, script: str, value: Any = None) -> Any:

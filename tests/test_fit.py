@@ -275,7 +275,7 @@ def test_a_result_shows_itself(clean):
     page = clean._repr_html_()
     for name, row in document(clean)["parameters"].items():
         assert f"    {name}:" in text
-        assert f"<th>{name}</th>" in page
+        assert f">{name}</th>" in page
         shown = measured(row["value"], row["sigma"])[0]
         assert shown in text
         assert shown in page

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import layerfit as lf
-from browser import chromium, until
+from browser import chromium, middle, until
 from layerfit.errors import InputError, MachineError
 from layerfit.report import pages
 
 pytest.importorskip("anywidget", reason="pip install 'layerfit[notebook]'")
+formatters = pytest.importorskip("IPython.core.formatters")
 
 NAME = "bare_concrete"
 """Its shader is the quickest to compile."""
@@ -66,21 +67,8 @@ def cell(widget):
         assert not [text for text in said if "GPU stall due to ReadPixels" not in text], said
 
 
-MIDDLE = """() => {
-    const seen = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
-    seen.drawImage(view.canvas, view.canvas.width >> 1, view.canvas.height >> 1, 1, 1, 0, 0, 1, 1);
-    return Array.from(seen.getImageData(0, 0, 1, 1).data);
-}"""
-
-
-def colour(page):
-    """Of the middle of the picture, when it is whole."""
-    until(page, "view.passes >= view.limit")
-    return np.array(page.evaluate(MIDDLE)[:3])
-
-
 def test_the_widget_draws_the_material(cell, widget):
-    assert colour(cell).max() > 20
+    assert middle(cell, "view").max() > 20
     assert cell.locator("fieldset legend").all_inner_texts() == [lf.read_preset(NAME).base.name]
     assert cell.evaluate("getComputedStyle(document.querySelector('.layerfit')).colorScheme") == "dark"
 
@@ -103,10 +91,10 @@ def test_a_value_in_python_moves_the_picture_and_the_slider(cell, widget):
     name = next(iter(widget.values))
     sent = []
     widget.observe(lambda change: sent.append(change["new"]), "values")
-    before = colour(cell)
+    before = middle(cell, "view")
     widget[name] = 0.02
     cell.evaluate("(values) => model.set('values', values)", sent[-1])
-    assert colour(cell).max() < 0.6 * before.max()
+    assert middle(cell, "view").max() < 0.6 * before.max()
     box = cell.get_by_label(f"{name}{' r' if isinstance(widget.values[name], list) else ''}, number")
     assert float(box.input_value()) == 0.02
     assert cell.evaluate("saved.length") == 1, "it would send back what it was sent"
@@ -119,6 +107,11 @@ def test_back_to_the_start_is_told_too(cell, widget):
         np.testing.assert_allclose(value, start[name], rtol=1e-6)
 
 
+def test_a_change_of_the_theme_is_followed(cell):
+    cell.evaluate("document.body.dataset.jpThemeLight = 'true'")
+    until(cell, "document.querySelector('.layerfit').style.colorScheme === 'light'")
+
+
 def test_a_cell_that_goes_gives_everything_back(cell):
     """Last: the view is gone after it."""
     cell.evaluate("end()")
@@ -127,6 +120,12 @@ def test_a_cell_that_goes_gives_everything_back(cell):
     passes = cell.evaluate("view.change() ?? view.passes")
     cell.wait_for_timeout(200)
     assert cell.evaluate("view.passes") == passes == 0
+
+
+def test_where_no_widget_is_shown_it_is_a_table(widget):
+    shown, _ = formatters.DisplayFormatter().format(widget)
+    assert shown["text/html"] == widget.material._repr_html_()
+    assert "application/vnd.jupyter.widget-view+json" in shown
 
 
 def test_values_are_checked(widget):

@@ -128,8 +128,8 @@ def test_the_page_says_what_the_terminal_says():
     assert "The model misses 23 % of the image." in text
     assert SIGMA in text.split("[[Fit]]")[0], "beside the table, not only in the lines below it"
     assert "The model misses" not in page_of("", DOCUMENT | {"flags": []})
-    assert "<td>± –</td>" in table(DOCUMENT["parameters"])
-    assert "<td>um</td>" in table(DOCUMENT["parameters"])
+    assert ">± –</td>" in table(DOCUMENT["parameters"])
+    assert ">um</td>" in table(DOCUMENT["parameters"])
 
 
 @pytest.mark.parametrize(

@@ -29,13 +29,14 @@ def pyplot(monkeypatch):
 
 def cells(html):
     """Words of a table, a list for each line."""
-    return [re.findall(r"<t[hd]>(.*?)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", html)]
+    return [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", html)]
 
 
 def test_a_material_shows_its_numbers():
     stack = lf.Stack((lf.Coat(name="varnish", alpha=0.1, eta=1.5, tau=[0.1, 0.2, 0.3]),), lf.Lambert(albedo=0.5))
     html = stack._repr_html_()
     assert html.startswith("<p>Coat over Lambert, corrected form</p>")
+    assert len(re.findall("<t[hd]", html)) == html.count("text-align: left"), "notebooks set cells to the right"
     rows = {row[0]: row[1:] for row in cells(html)}
     assert rows["varnish.tau"][0] == "0.1, 0.2, 0.3"
     assert rows["base.albedo"][0] == "0.5"

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .._html import table as html_table
+from .._html import cell, table as html_table
 from ..stack import Stack
 
 SIGMA = (
@@ -47,8 +47,8 @@ def table(rows: Mapping[str, Mapping[str, Any]]) -> str:
     """The same as an HTML table; a column that holds nothing is left out."""
     lines = [_cells(name, row) for name, row in rows.items()]
     kept = [k for k, column in enumerate(zip(*lines, strict=True)) if any(column)]
-    heads = "".join(f"<th>{HEADS[k]}</th>" for k in kept)
-    body = "".join(f"<tr>{''.join(KINDS[k].format(html.escape(line[k])) for k in kept)}</tr>" for line in lines)
+    heads = "".join(cell("th", HEADS[k]) for k in kept)
+    body = "".join(f"<tr>{''.join(_shown(k, line[k]) for k in kept)}</tr>" for line in lines)
     return f"<table><tr>{heads}</tr>{body}</table>"
 
 
@@ -86,8 +86,11 @@ def _cell(row: Mapping[str, Any], name: str) -> str:
 
 
 HEADS = ("parameter", "value", "sigma", "unit", "corrected", "start", "")
-KINDS = ("<th>{}</th>", *["<td>{}</td>"] * 4, "<td class=soft>{}</td>", "<td>{}</td>")
-"""Of the cells below them."""
+
+
+def _shown(k: int, words: str) -> str:
+    words = html.escape(words)
+    return cell("td" if k else "th", f"<span class=soft>{words}</span>" if HEADS[k] == "start" else words)
 
 
 def _cells(name: str, row: Mapping[str, Any]) -> list[str]:

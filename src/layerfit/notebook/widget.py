@@ -33,6 +33,10 @@ class Widget(anywidget.AnyWidget):
         """The material with the numbers of the sliders."""
         return with_fixed(self._stack, self.values, "live")
 
+    def _repr_html_(self) -> str:
+        """For what shows no widgets, beside the widget: notebooks read where they are not run."""
+        return self.material._repr_html_()
+
     def __getitem__(self, name: str) -> Any:
         return self.values[name]
 

@@ -5,16 +5,17 @@ const shared = () => (globalThis[Symbol.for(`layerfit ${Renderer}`)] ??= new Ren
 
 // Whether the notebook is dark, where it says so: JupyterLab and VS Code do. Else the system's choice holds.
 function scheme() {
-  const { dataset, classList } = document.body;
-  const dark = dataset.jpThemeLight === "false" || classList.contains("vscode-dark");
-  const light = dataset.jpThemeLight === "true" || classList.contains("vscode-light");
-  return dark ? "dark" : light ? "light" : "light dark";
+  const { jpThemeLight, vscodeThemeKind } = document.body.dataset;
+  const light = { true: true, false: false }[jpThemeLight] ?? vscodeThemeKind?.endsWith("light");
+  return light === undefined ? "light dark" : light ? "light" : "dark";
 }
 
 async function render({ model, el }) {
   const host = element("div", { className: "layerfit" });
   const root = host.attachShadow({ mode: "open" });  // styles neither come in nor leave
   const place = element("div", { className: "viewer" });
+  const themed = new MutationObserver(() => { host.style.colorScheme = scheme(); });
+  themed.observe(document.body, { attributeFilter: ["data-jp-theme-light", "data-vscode-theme-kind"] });
   host.style.colorScheme = scheme();
   root.append(element("style", { textContent: STYLE }), place);
   el.append(host);
@@ -39,6 +40,7 @@ async function render({ model, el }) {
   return () => {
     model.off("change:values", take);
     stop();
+    themed.disconnect();
     host.remove();
   };
 }
