@@ -4,7 +4,7 @@ NODE_PATH names the folder that has their packages.
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -108,19 +108,16 @@ def needs(packages: tuple[str, ...]) -> pytest.MarkDecorator:
 
 
 @contextmanager
-def engine_page(packages: tuple[str, ...]) -> Iterator[Any]:
-    """A page that finds the packages where pages find their modules. No script of it may fail."""
-    babylon = "".join(f'export {{ {name} }} from "@babylonjs/core/{place}";' for name, place in USED.items())
-    if "@babylonjs/loaders" in packages:
-        babylon += 'import "@babylonjs/loaders/glTF/2.0/index.js";'
-    texts = {"babylon.js": babylon} | {f"lit_{name}.js": text for name, text in LIT.items()}
+def packaged(packages: tuple[str, ...], texts: Mapping[str, str], **functions: Callable[..., Any]) -> Iterator[Any]:
+    """A page that finds the packages by their names, and these functions; of texts, the one without a name is the page.
+
+    No script of it may fail.
+    """
 
     def serve(route: Any) -> None:
         name = route.request.url.partition("//")[2].partition("/")[2]
-        if name == "":
-            route.fulfill(body=PAGE, content_type="text/html")
-        elif name in texts:
-            route.fulfill(body=texts[name], content_type="text/javascript")
+        if name in texts:
+            route.fulfill(body=texts[name], content_type="text/javascript" if name else "text/html")
         elif (path := Path(str(_folder(packages))) / name).is_file():
             route.fulfill(path=str(path), content_type="text/javascript")
         else:
@@ -132,10 +129,22 @@ def engine_page(packages: tuple[str, ...]) -> Iterator[Any]:
         page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
         page.on("pageerror", lambda error: said.append(str(error)))
         page.route("**/*", serve)
+        for name, function in functions.items():
+            page.expose_function(name, function)
         page.goto("http://engine.test/")
         yield page
         page.close()
         assert not said, said
+
+
+@contextmanager
+def engine_page(packages: tuple[str, ...]) -> Iterator[Any]:
+    """A page that finds the packages where pages find their modules."""
+    babylon = "".join(f'export {{ {name} }} from "@babylonjs/core/{place}";' for name, place in USED.items())
+    if "@babylonjs/loaders" in packages:
+        babylon += 'import "@babylonjs/loaders/glTF/2.0/index.js";'
+    with packaged(packages, {"": PAGE, "babylon.js": babylon} | {f"lit_{name}.js": text for name, text in LIT.items()}) as page:
+        yield page
 
 
 def radiance(page: Any, script: str, value: Any, lights: int) -> np.ndarray:
