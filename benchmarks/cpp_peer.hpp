@@ -122,6 +122,11 @@ CHAIN pow(Dual<K, S> a, float b) {
 CHAIN operator-(Dual<K, S> a) { return chain(a, -a.v, -1.0f); }
 ONE abs(A a) { return select(value(a) < 0.0f, -a, a); }
 
+template <class T> struct vec2 {
+    T x, y;
+    template <class A, class B> INLINE vec2(A x, B y) : x(as<T>(x)), y(as<T>(y)) {}
+};
+template <class A, class B> vec2(A, B) -> vec2<decltype(A() + B())>;
 template <class T> struct vec3 {
     T x, y, z;
     template <class A, class B, class C> INLINE vec3(A x, B y, C z) : x(as<T>(x)), y(as<T>(y)), z(as<T>(z)) {}

@@ -174,7 +174,7 @@ def cpp(stack: Stack) -> str:
         parts = (
             [read(field) for field, _ in fields[kind]]
             if kind in fields
-            else ["from.one()"] * {"float": 1, "vec3": 3, "vec4": 4}[kind]
+            else ["from.one()"] * {"float": 1, "vec2": 2, "vec3": 3, "vec4": 4}[kind]
         )
         return parts[0] if kind == "float" else f"{kind}{{{', '.join(parts)}}}"
 
