@@ -19,7 +19,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -70,12 +70,12 @@ const Interface lf_shellac_interface = Interface(
     0.009790741,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.024019195, 0.037430365, -0.012146365, -0.008774286),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.01589695, -0.00900097),                                // passed_high: the other two, of higher powers
-    vec4(0.01888021, -0.03414776, 0.028381942, -0.020505816),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.009172212, -0.00040528714),                            // bend_high: 
+    vec4(0.32968402, 0.022465572, -0.018672392, 0.013491154),     // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0060342997, 0.00026619434),                           // bend_high: 
     vec4(0.7622598, -0.35900348, 0.3005035, -0.38898873),         // spread: width of a lobe seen through it, over that of the facets
     vec2(0.0026233941, 0.06684631),                               // spread_high: 
-    vec4(1.0406599, -0.08520222, 0.085663974, -0.055683732),      // path: mean path over that of the refracted direction
-    vec2(-0.002040565, 0.01779306),                               // path_high: 
+    vec4(1.0406599, -0.085202515, 0.085663795, -0.05568254),      // path: mean path over that of the refracted direction
+    vec2(-0.0020405054, 0.017791867),                             // path_high: 
     vec4(0.09075124, -0.2020707, 0.24339886, -0.256472),          // theta: scale of the path's distribution
     vec2(0.061698347, 0.08315918)                                 // theta_high: 
 );
@@ -87,21 +87,21 @@ const Conductor lf_gold = Conductor(
 );
 
 const Curve lf_shellac_again = Curve(
-    vec3(0.13857856, 0.10929926, 0.053955764),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.009116745, -0.0070479074, -0.0031201364),  // c1: 
-    vec3(0.01774586, 0.014638117, 0.0070619714),       // c2: 
-    vec3(0.012346193, 0.009120956, 0.0037746653),      // c3: 
-    vec3(-0.045131255, -0.0354554, -0.016701838),      // c4: 
-    vec3(-0.04931666, -0.037695386, -0.017225698)      // c5: 
+    vec3(0.40891638, 0.3620838, 0.25310048),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.018592961, -0.015949883, -0.009579115),  // c1: 
+    vec3(0.05141133, 0.047353648, 0.032201283),      // c2: 
+    vec3(0.03234136, 0.026813328, 0.014909267),      // c3: 
+    vec3(-0.122347295, -0.10778068, -0.071430765),   // c4: 
+    vec3(-0.13266781, -0.113839954, -0.07283193)     // c5: 
 );
 
 const Curve lf_shellac_rest = Curve(
-    vec3(0.94015753, 0.625161, 0.29161036),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.07055695, -0.04746662, -0.022553798),  // c1: 
-    vec3(0.03235796, 0.021158427, 0.00868921),     // c2: 
-    vec3(0.035348237, 0.023400962, 0.014860764),   // c3: 
-    vec3(-0.18866628, -0.12874925, -0.064854026),  // c4: 
-    vec3(-0.20295101, -0.13614896, -0.07137421)    // c5: 
+    vec3(0.9373171, 0.62408614, 0.29151306),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.07019104, -0.047252066, -0.022525381),  // c1: 
+    vec3(0.032596573, 0.021492511, 0.008981556),    // c2: 
+    vec3(0.03644508, 0.024715662, 0.0157561),       // c3: 
+    vec3(-0.18867716, -0.12918195, -0.06526566),    // c4: 
+    vec3(-0.20338768, -0.13721162, -0.07224263)     // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -140,12 +140,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
@@ -300,7 +300,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_gold.eta, lf_gold.k);
     float rise = 1.0 + 0.468 * lf_presence(lf_shellac.eta) * lf_shellac.alpha * lf_shellac.alpha * shares.base;
-    vec3 again = 0.5 * F2 * (lf_amount(lf_shellac_again, crossing.s) + lf_amount(lf_shellac_again, crossing2.s));
+    vec3 again = F2 * (lf_amount(lf_shellac_again, crossing.s) * lf_amount(lf_shellac_again, crossing2.s));
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_gold.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_gold.alpha, lf_shellac.alpha));
     vec3 root = lf_amount(lf_shellac_rest, crossing.s) * lf_amount(lf_shellac_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_shellac.eta, lf_gold.alpha);

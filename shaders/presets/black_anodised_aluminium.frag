@@ -20,7 +20,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -69,18 +69,18 @@ const Coat lf_oxide = Coat(
 );
 
 const Interface lf_oxide_interface = Interface(
-    0.030373108,                                               // tilt: turn of the mean facet towards a grazing direction
-    0.051016223,                                               // gain: part of the reflected light that a second facet lets in
-    vec4(-0.03604947, 0.010694278, 0.02764687, 0.0047039147),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(-0.007703439, -0.0034511923),                         // passed_high: the other two, of higher powers
-    vec4(0.10008009, -0.14083755, 0.047642227, 0.011817302),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(-0.011681536, 0.0024273526),                          // bend_high: 
-    vec4(0.8590729, -0.43609256, 0.091488555, 0.071232915),    // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.10349935, -0.044332564),                           // spread_high: 
-    vec4(1.1351962, -0.21217495, 0.067353785, 0.038277626),    // path: mean path over that of the refracted direction
-    vec2(-0.021671832, -0.002115488),                          // path_high: 
-    vec4(0.41057786, -0.7462359, 0.3733016, 0.0021906942),     // theta: scale of the path's distribution
-    vec2(-0.08426255, 0.08728502)                              // theta_high: 
+    0.030373108,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.051016223,                                                // gain: part of the reflected light that a second facet lets in
+    vec4(-0.03604947, 0.010694278, 0.02764687, 0.0047039147),   // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(-0.007703439, -0.0034511923),                          // passed_high: the other two, of higher powers
+    vec4(0.33328477, 0.08535605, -0.028874338, -0.0071616173),  // bend: part by which the sine of light becomes smaller below
+    vec2(0.0070798993, -0.001471281),                           // bend_high: 
+    vec4(0.8590729, -0.43609256, 0.091488555, 0.071232915),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.10349935, -0.044332564),                            // spread_high: 
+    vec4(1.1351962, -0.21217531, 0.06735343, 0.038279057),      // path: mean path over that of the refracted direction
+    vec2(-0.021671593, -0.0021164417),                          // path_high: 
+    vec4(0.41057786, -0.7462359, 0.3733016, 0.0021906942),      // theta: scale of the path's distribution
+    vec2(-0.08426255, 0.08728502)                               // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -91,21 +91,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.011797163, 0.011201477, 0.010092123),         // c0: coefficients of the powers of the curves' argument
-    vec3(0.0011525475, 0.0011055458, 0.0010179856),      // c1: 
-    vec3(0.00063456735, 0.00060508447, 0.0005502179),    // c2: 
-    vec3(0.0016498081, 0.0015635174, 0.0014035571),      // c3: 
-    vec3(-0.00080424454, -0.0007445696, -0.0006361869),  // c4: 
-    vec3(-0.0017090943, -0.0016042795, -0.0014119484)    // c5: 
+    vec3(0.104854375, 0.10206635, 0.096675426),        // c0: coefficients of the powers of the curves' argument
+    vec3(0.0091195535, 0.008974072, 0.008701652),      // c1: 
+    vec3(0.004846167, 0.004751388, 0.0045690164),      // c2: 
+    vec3(0.013297945, 0.012933224, 0.012231156),       // c3: 
+    vec3(-0.006633155, -0.0063097626, -0.0056951344),  // c4: 
+    vec3(-0.013976812, -0.013466537, -0.012491435)     // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.23026316, 0.22859032, 0.22297509),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.003695365, -0.003735289, -0.0037353113),  // c1: 
-    vec3(0.007266909, 0.0073630065, 0.007492587),     // c2: 
-    vec3(0.024630308, 0.024802774, 0.024928242),      // c3: 
-    vec3(-0.026313663, -0.026173554, -0.025652163),   // c4: 
-    vec3(-0.036676407, -0.03663984, -0.036236435)     // c5: 
+    vec3(0.23813432, 0.23644817, 0.23073103),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.003821373, -0.003863968, -0.003866382),  // c1: 
+    vec3(0.007524319, 0.0076254383, 0.007762745),    // c2: 
+    vec3(0.025510311, 0.025694638, 0.025834829),     // c3: 
+    vec3(-0.027204603, -0.027065605, -0.026538067),  // c4: 
+    vec3(-0.0379439, -0.037914604, -0.037513465)     // c5: 
 );
 
 const Interface lf_oxide_across = Interface(
@@ -113,12 +113,12 @@ const Interface lf_oxide_across = Interface(
     0.19855128,                                               // gain: part of the reflected light that a second facet lets in
     vec4(-0.0848371, 0.031376388, -0.008033876, 0.03345237),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.01668107, -0.007443741),                           // passed_high: the other two, of higher powers
-    vec4(0.2908306, -0.17414103, -0.08314511, -0.010737725),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.022834145, 0.013541639),                           // bend_high: 
+    vec4(0.21767838, 0.10554002, 0.050390884, 0.0065075755),  // bend: part by which the sine of light becomes smaller below
+    vec2(-0.013838798, -0.008206964),                         // bend_high: 
     vec4(0.6156385, -0.029582255, -0.07202415, -0.04607129),  // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.026856184, -0.013792217),                         // spread_high: 
-    vec4(1.272488, -0.24106285, -0.07674903, 0.038464427),    // path: mean path over that of the refracted direction
-    vec2(0.026356637, 0.0006881952),                          // path_high: 
+    vec4(1.272488, -0.24106231, -0.076749146, 0.038462996),   // path: mean path over that of the refracted direction
+    vec2(0.026356041, 0.0006901026),                          // path_high: 
     vec4(0.9425542, -1.0819294, -0.15661979, 0.31639296),     // theta: scale of the path's distribution
     vec2(0.092320696, -0.033271924)                           // theta_high: 
 );
@@ -182,12 +182,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, vec2 alpha, vec3 w) 
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = min((1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta, 1.0);
-    float z = sqrt(w.z * w.z + (1.0 - bend) * (1.0 + bend) * dot(w.xy, w.xy));
+    float bend = max(lf_curve(interface_.bend, interface_.bend_high, s), 0.0);
+    float z = sqrt(w.z * w.z + bend * (2.0 - bend) * dot(w.xy, w.xy));
     vec2 a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec3(w.xy * bend, z), T, a, path, theta, s);
+    return Crossing(vec3(w.xy * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
@@ -353,7 +353,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float even = sqrt(0.5 * (lf_oxide.alpha_x * lf_oxide.alpha_x + lf_oxide.alpha_y * lf_oxide.alpha_y));
     float rise = 1.0 + 0.468 * lf_presence(lf_oxide.eta) * even * even * share;
-    vec3 again = 0.5 * F2 * (lf_amount(lf_oxide_again, crossing.s) + lf_amount(lf_oxide_again, crossing2.s));
+    vec3 again = F2 * (lf_amount(lf_oxide_again, crossing.s) * lf_amount(lf_oxide_again, crossing2.s));
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, lf_wider(own, top));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, sqrt(0.5 * (lf_aluminium.alpha_x * lf_aluminium.alpha_x + lf_aluminium.alpha_y * lf_aluminium.alpha_y)));

@@ -19,7 +19,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -70,12 +70,12 @@ const Interface lf_oxide_interface = Interface(
     0.10031511,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.04464719, 0.00010519335, 0.016922252, 0.03386515),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0017023832, -0.012983762),                          // passed_high: the other two, of higher powers
-    vec4(0.17456408, -0.18511207, -0.0043630255, 0.038041946),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.00433427, -0.0060364865),                            // bend_high: 
+    vec4(0.28814295, 0.11218918, 0.0026443005, -0.02305597),    // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0026268214, 0.0036585927),                          // bend_high: 
     vec4(0.79491526, -0.2609493, -0.08429666, 0.0621534),       // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.023329884, -0.05259615),                            // spread_high: 
-    vec4(1.1995243, -0.24667987, -0.003308177, 0.06897068),     // path: mean path over that of the refracted direction
-    vec2(0.004082501, -0.013128996),                            // path_high: 
+    vec4(1.1995242, -0.24667993, -0.0033078194, 0.0689702),     // path: mean path over that of the refracted direction
+    vec2(0.004082024, -0.013128281),                            // path_high: 
     vec4(0.6451652, -0.96579504, 0.16259342, 0.2337165),        // theta: scale of the path's distribution
     vec2(-0.020245273, 0.0012745932)                            // theta_high: 
 );
@@ -87,21 +87,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.0030072567, 0.033646416, 0.21407795),        // c0: coefficients of the powers of the curves' argument
-    vec3(0.0004049443, 0.0023594722, -0.0016268417),    // c1: 
-    vec3(2.6550028e-05, 0.00046283938, 0.00085831434),  // c2: 
-    vec3(0.00017383927, 0.0033745132, 0.022940159),     // c3: 
-    vec3(2.6163878e-05, -0.0023595206, -0.024178363),   // c4: 
-    vec3(-0.0001234524, -0.004356019, -0.035127968)     // c5: 
+    vec3(0.05216973, 0.18226685, 0.48229796),         // c0: coefficients of the powers of the curves' argument
+    vec3(0.006402458, 0.0109669715, -0.010792479),    // c1: 
+    vec3(0.00039509684, 0.0014611259, 0.0023912638),  // c2: 
+    vec3(0.002899006, 0.016545624, 0.05675924),       // c3: 
+    vec3(0.00027896836, -0.011527926, -0.056000143),  // c4: 
+    vec3(-0.002173029, -0.021488309, -0.08346373)     // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.15471728, 0.32881266, 0.68891054),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0013905913, -0.0043903515, -0.02771099),  // c1: 
-    vec3(0.010127414, 0.010078445, 0.01609689),       // c2: 
-    vec3(0.022133812, 0.023329765, 0.044974685),      // c3: 
-    vec3(-0.020934343, -0.036226824, -0.07475531),    // c4: 
-    vec3(-0.02896674, -0.04260668, -0.08668941)       // c5: 
+    vec3(0.15961243, 0.33627978, 0.69247127),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0014310218, -0.0044643655, -0.027497545),  // c1: 
+    vec3(0.010483272, 0.010484442, 0.01631397),        // c2: 
+    vec3(0.022891164, 0.024199605, 0.045260668),       // c3: 
+    vec3(-0.02161958, -0.03719537, -0.07513592),       // c4: 
+    vec3(-0.029927164, -0.043860078, -0.08712119)      // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -140,12 +140,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
@@ -300,7 +300,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float rise = 1.0 + 0.468 * lf_presence(lf_oxide.eta) * lf_oxide.alpha * lf_oxide.alpha * shares.base;
-    vec3 again = 0.5 * F2 * (lf_amount(lf_oxide_again, crossing.s) + lf_amount(lf_oxide_again, crossing2.s));
+    vec3 again = F2 * (lf_amount(lf_oxide_again, crossing.s) * lf_amount(lf_oxide_again, crossing2.s));
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_oxide.alpha));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, lf_aluminium.alpha);

@@ -19,7 +19,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -66,18 +66,18 @@ const Coat lf_glass = Coat(
 );
 
 const Interface lf_glass_interface = Interface(
-    0.0031546694,                                                   // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                   // gain: part of the reflected light that a second facet lets in
-    vec4(-0.0095665855, 0.02155129, -0.023891417, 0.015120622),     // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.006776768, -0.010278594),                                // passed_high: the other two, of higher powers
-    vec4(0.003618297, -0.006836458, 0.0020751434, -0.00092199584),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.0109949745, -0.008830786),                               // bend_high: 
-    vec4(0.7543955, -0.22650662, -0.1283072, -0.057732522),         // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.4508241, -0.40081078),                                   // spread_high: 
-    vec4(1.0096666, -0.020288736, 0.014123499, -0.017482638),       // path: mean path over that of the refracted direction
-    vec2(0.037245095, -0.023303747),                                // path_high: 
-    vec4(0.020642612, -0.03597436, 0.01141594, -0.083641335),       // theta: scale of the path's distribution
-    vec2(0.14392288, -0.04268641)                                   // theta_high: 
+    0.0031546694,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.0095665855, 0.02155129, -0.023891417, 0.015120622),   // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.006776768, -0.010278594),                              // passed_high: the other two, of higher powers
+    vec4(0.35250428, 0.004410565, -0.0013388395, 0.00059479475),  // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0070934147, 0.005697429),                             // bend_high: 
+    vec4(0.7543955, -0.22650662, -0.1283072, -0.057732522),       // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.4508241, -0.40081078),                                 // spread_high: 
+    vec4(1.0096664, -0.020288795, 0.014123917, -0.017482638),     // path: mean path over that of the refracted direction
+    vec2(0.037244797, -0.023303747),                              // path_high: 
+    vec4(0.020642612, -0.03597436, 0.01141594, -0.083641335),     // theta: scale of the path's distribution
+    vec2(0.14392288, -0.04268641)                                 // theta_high: 
 );
 
 const Conductor lf_silver = Conductor(
@@ -87,21 +87,21 @@ const Conductor lf_silver = Conductor(
 );
 
 const Curve lf_glass_again = Curve(
-    vec3(0.0039068405, 0.01311617, 0.098188706),         // c0: coefficients of the powers of the curves' argument
-    vec3(2.1855463e-05, -4.9984083e-05, -0.0018977616),  // c1: 
-    vec3(0.0003257913, 0.001216738, 0.00968701),         // c2: 
-    vec3(0.00067685684, 0.0027165357, 0.024231195),      // c3: 
-    vec3(-0.00023415149, -0.0012953002, -0.015381031),   // c4: 
-    vec3(-0.00059962785, -0.0027615484, -0.028714344)    // c5: 
+    vec3(0.06153016, 0.11409618, 0.31868613),          // c0: coefficients of the powers of the curves' argument
+    vec3(0.00029183738, -0.0005030446, -0.006262228),  // c1: 
+    vec3(0.0047156177, 0.009853888, 0.03021495),       // c2: 
+    vec3(0.00978037, 0.022047073, 0.07574308),         // c3: 
+    vec3(-0.0033978596, -0.01047615, -0.04704483),     // c4: 
+    vec3(-0.008685246, -0.022395283, -0.08875987)      // c5: 
 );
 
 const Curve lf_glass_rest = Curve(
-    vec3(0.22587682, 0.3337894, 0.745916),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0118727945, -0.015872866, -0.033473134),  // c1: 
-    vec3(0.008570455, 0.009286493, 0.021132022),      // c2: 
-    vec3(0.040868968, 0.045088857, 0.07723862),       // c3: 
-    vec3(-0.022483155, -0.031714484, -0.086557984),   // c4: 
-    vec3(-0.042972386, -0.053251296, -0.12113875)     // c5: 
+    vec3(0.22597377, 0.33390704, 0.7458091),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.011878207, -0.015880309, -0.033464015),  // c1: 
+    vec3(0.008575328, 0.009294793, 0.021119118),     // c2: 
+    vec3(0.040892154, 0.04512298, 0.077221334),      // c3: 
+    vec3(-0.02249311, -0.031728834, -0.08651626),    // c4: 
+    vec3(-0.04299441, -0.053283244, -0.12109262)     // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -140,12 +140,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
@@ -300,7 +300,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_silver.eta, lf_silver.k);
     float rise = 1.0 + 0.468 * lf_presence(lf_glass.eta) * lf_glass.alpha * lf_glass.alpha * shares.base;
-    vec3 again = 0.5 * F2 * (lf_amount(lf_glass_again, crossing.s) + lf_amount(lf_glass_again, crossing2.s));
+    vec3 again = F2 * (lf_amount(lf_glass_again, crossing.s) * lf_amount(lf_glass_again, crossing2.s));
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_silver.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_silver.alpha, lf_glass.alpha));
     vec3 root = lf_amount(lf_glass_rest, crossing.s) * lf_amount(lf_glass_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_glass.eta, lf_silver.alpha);

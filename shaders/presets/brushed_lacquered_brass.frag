@@ -19,7 +19,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -71,12 +71,12 @@ const Interface lf_lacquer_interface = Interface(
     0.009790741,                                                // gain: part of the reflected light that a second facet lets in
     vec4(-0.02416102, 0.037756085, -0.01229288, -0.008737861),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.015993359, -0.009139275),                            // passed_high: the other two, of higher powers
-    vec4(0.01835048, -0.033296723, 0.02771719, -0.019966267),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.008862132, -0.0003390262),                           // bend_high: 
+    vec4(0.3210997, 0.02219797, -0.01847817, 0.013310194),      // bend: part by which the sine of light becomes smaller below
+    vec2(-0.005908057, 0.00022640824),                          // bend_high: 
     vec4(0.75101304, -0.35615644, 0.2937088, -0.38354492),      // spread: width of a lobe seen through it, over that of the facets
     vec2(0.001817733, 0.06761384),                              // spread_high: 
-    vec4(1.0406462, -0.08552843, 0.08595249, -0.055620193),     // path: mean path over that of the refracted direction
-    vec2(-0.0024152398, 0.018114805),                           // path_high: 
+    vec4(1.0406462, -0.085528314, 0.08595249, -0.055620432),    // path: mean path over that of the refracted direction
+    vec2(-0.002415359, 0.018115044),                            // path_high: 
     vec4(0.08841845, -0.19763331, 0.23841499, -0.2506254),      // theta: scale of the path's distribution
     vec2(0.060514007, 0.080532625)                              // theta_high: 
 );
@@ -89,21 +89,21 @@ const Conductor lf_brass = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.14512728, 0.14044529, 0.13300277),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0060996544, -0.0057417415, -0.0058122594),  // c1: 
-    vec3(-0.0026760548, -0.0028334, -0.0032775812),     // c2: 
-    vec3(0.0047100484, 0.0035177618, 0.00075277686),    // c3: 
-    vec3(-0.025664493, -0.024776977, -0.023785159),     // c4: 
-    vec3(-0.028431416, -0.026775666, -0.024223797)      // c5: 
+    vec3(0.41816452, 0.41162527, 0.40265685),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.014218695, -0.013605252, -0.014132589),   // c1: 
+    vec3(-0.0063857883, -0.007010661, -0.008479655),  // c2: 
+    vec3(0.010630757, 0.007878184, 0.00059580803),    // c3: 
+    vec3(-0.06879403, -0.06744358, -0.06682193),      // c4: 
+    vec3(-0.07393828, -0.070872664, -0.06618884)      // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.8352855, 0.71676904, 0.45101696),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.042650893, -0.036231443, -0.025202997),  // c1: 
-    vec3(0.02819249, 0.023769334, 0.013604745),      // c2: 
-    vec3(0.010055304, 0.0022403598, -0.0085222125),  // c3: 
-    vec3(-0.13798976, -0.12151852, -0.08213316),     // c4: 
-    vec3(-0.11965972, -0.10060024, -0.06240341)      // c5: 
+    vec3(0.8334882, 0.715165, 0.44966954),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.042363122, -0.03596078, -0.024968244),  // c1: 
+    vec3(0.02835232, 0.023965344, 0.013841599),     // c2: 
+    vec3(0.010354042, 0.0026351213, -0.007986486),  // c3: 
+    vec3(-0.13817763, -0.12176663, -0.082419276),   // c4: 
+    vec3(-0.119815946, -0.10085952, -0.06278241)    // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -142,12 +142,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.z * w.z + (1.0 - bend) * (1.0 + bend) * dot(w.xy, w.xy));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.z * w.z + bend * (2.0 - bend) * dot(w.xy, w.xy));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec3(w.xy * bend, z), T, a, path, theta, s);
+    return Crossing(vec3(w.xy * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
@@ -313,7 +313,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_brass.eta, lf_brass.k);
     float rise = 1.0 + 0.468 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * share;
-    vec3 again = 0.5 * F2 * (lf_amount(lf_lacquer_again, crossing.s) + lf_amount(lf_lacquer_again, crossing2.s));
+    vec3 again = F2 * (lf_amount(lf_lacquer_again, crossing.s) * lf_amount(lf_lacquer_again, crossing2.s));
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, lf_wider(own, lf_lacquer.alpha));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, sqrt(0.5 * (lf_brass.alpha_x * lf_brass.alpha_x + lf_brass.alpha_y * lf_brass.alpha_y)));

@@ -17,7 +17,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -46,18 +46,18 @@ const Coat lf_clear_coat = Coat(
 );
 
 const Interface lf_clear_coat_interface = Interface(
-    0.0031546694,                                                    // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                    // gain: part of the reflected light that a second facet lets in
-    vec4(-0.00965715, 0.021873731, -0.0242624, 0.015375613),         // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.0068878005, -0.010487776),                                // passed_high: the other two, of higher powers
-    vec4(0.0033821939, -0.0064339936, 0.001987853, -0.00090263993),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.010334163, -0.008277145),                                 // bend_high: 
-    vec4(0.72952676, -0.2272397, -0.12848555, -0.058554053),         // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.43840846, -0.38560963),                                   // spread_high: 
-    vec4(1.009759, -0.020711154, 0.014585555, -0.017857552),         // path: mean path over that of the refracted direction
-    vec2(0.037453353, -0.02328682),                                  // path_high: 
-    vec4(0.019467048, -0.03448579, 0.0112755345, -0.07768409),       // theta: scale of the path's distribution
-    vec2(0.13575086, -0.04182259)                                    // theta_high: 
+    0.0031546694,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                // gain: part of the reflected light that a second facet lets in
+    vec4(-0.00965715, 0.021873731, -0.0242624, 0.015375613),     // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.0068878005, -0.010487776),                            // passed_high: the other two, of higher powers
+    vec4(0.3310786, 0.0042891726, -0.0013253987, 0.0006019473),  // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0068892688, 0.0055179894),                           // bend_high: 
+    vec4(0.72952676, -0.2272397, -0.12848555, -0.058554053),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.43840846, -0.38560963),                               // spread_high: 
+    vec4(1.009759, -0.020711035, 0.014585435, -0.017858267),     // path: mean path over that of the refracted direction
+    vec2(0.037453473, -0.023287058),                             // path_high: 
+    vec4(0.019467048, -0.03448579, 0.0112755345, -0.07768409),   // theta: scale of the path's distribution
+    vec2(0.13575086, -0.04182259)                                // theta_high: 
 );
 
 const Lambert lf_paint = Lambert(
@@ -102,12 +102,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

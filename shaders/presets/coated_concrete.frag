@@ -18,7 +18,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -49,18 +49,18 @@ const Coat lf_sealer = Coat(
 );
 
 const Interface lf_sealer_interface = Interface(
-    0.016290857,                                                 // tilt: turn of the mean facet towards a grazing direction
-    0.018790323,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.030293863, 0.03411546, 0.007858283, -0.016438136),   // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.0055495244, -0.0017564549),                           // passed_high: the other two, of higher powers
-    vec4(0.032763314, -0.057083204, 0.041801285, -0.019719291),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(-0.0017260615, 0.0064610373),                           // bend_high: 
-    vec4(0.7569307, -0.4166647, 0.2770872, -0.21254128),         // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.11134212, 0.0695622),                                // spread_high: 
-    vec4(1.0665971, -0.13207102, 0.09955791, -0.031070113),      // path: mean path over that of the refracted direction
-    vec2(-0.02146858, 0.020035863),                              // path_high: 
-    vec4(0.15087932, -0.33279446, 0.3304903, -0.2277554),        // theta: scale of the path's distribution
-    vec2(-0.014587497, 0.115838975)                              // theta_high: 
+    0.016290857,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.018790323,                                                // gain: part of the reflected light that a second facet lets in
+    vec4(-0.030293863, 0.03411546, 0.007858283, -0.016438136),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.0055495244, -0.0017564549),                          // passed_high: the other two, of higher powers
+    vec4(0.30218697, 0.038569808, -0.028244078, 0.0133236945),  // bend: part by which the sine of light becomes smaller below
+    vec2(0.0011662543, -0.0043652654),                          // bend_high: 
+    vec4(0.7569307, -0.4166647, 0.2770872, -0.21254128),        // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.11134212, 0.0695622),                               // spread_high: 
+    vec4(1.0665972, -0.13207108, 0.09955773, -0.031070113),     // path: mean path over that of the refracted direction
+    vec2(-0.021468341, 0.020035625),                            // path_high: 
+    vec4(0.15087932, -0.33279446, 0.3304903, -0.2277554),       // theta: scale of the path's distribution
+    vec2(-0.014587497, 0.115838975)                             // theta_high: 
 );
 
 const OrenNayar lf_concrete = OrenNayar(
@@ -119,12 +119,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

@@ -18,7 +18,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -49,18 +49,18 @@ const Coat lf_shellac = Coat(
 );
 
 const Interface lf_shellac_interface = Interface(
-    0.0031546694,                                                   // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                   // gain: part of the reflected light that a second facet lets in
-    vec4(-0.009618692, 0.021733595, -0.024097253, 0.0152621865),    // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.0068437173, -0.0104005365),                              // passed_high: the other two, of higher powers
-    vec4(0.003477717, -0.0065967487, 0.002022285, -0.00091052987),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.01060319, -0.008502161),                                 // bend_high: 
-    vec4(0.7398473, -0.22701198, -0.12849008, -0.05826497),         // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.44370586, -0.39202416),                                  // spread_high: 
-    vec4(1.0097235, -0.02054125, 0.014399737, -0.017715454),        // path: mean path over that of the refracted direction
-    vec2(0.037379563, -0.02329731),                                 // path_high: 
-    vec4(0.019935852, -0.035078302, 0.011336705, -0.08009496),      // theta: scale of the path's distribution
-    vec2(0.13903353, -0.042160243)                                  // theta_high: 
+    0.0031546694,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.009618692, 0.021733595, -0.024097253, 0.0152621865),   // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.0068437173, -0.0104005365),                             // passed_high: the other two, of higher powers
+    vec4(0.33981726, 0.0043400154, -0.0013305843, 0.00059890747),  // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0069757253, 0.005593419),                              // bend_high: 
+    vec4(0.7398473, -0.22701198, -0.12849008, -0.05826497),        // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.44370586, -0.39202416),                                 // spread_high: 
+    vec4(1.0097235, -0.020541668, 0.014399797, -0.017714024),      // path: mean path over that of the refracted direction
+    vec2(0.0373798, -0.023298264),                                 // path_high: 
+    vec4(0.019935852, -0.035078302, 0.011336705, -0.08009496),     // theta: scale of the path's distribution
+    vec2(0.13903353, -0.042160243)                                 // theta_high: 
 );
 
 const OrenNayar lf_mahogany = OrenNayar(
@@ -119,12 +119,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

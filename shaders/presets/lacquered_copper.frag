@@ -19,7 +19,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -70,12 +70,12 @@ const Interface lf_lacquer_interface = Interface(
     0.051016223,                                                // gain: part of the reflected light that a second facet lets in
     vec4(-0.037516396, 0.012820616, 0.028922228, 0.005808585),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.008892238, -0.004150729),                           // passed_high: the other two, of higher powers
-    vec4(0.08205869, -0.11701773, 0.038625695, 0.011266199),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(-0.009455263, 0.0018412061),                           // bend_high: 
+    vec4(0.27862754, 0.07801179, -0.025750428, -0.007510811),   // bend: part by which the sine of light becomes smaller below
+    vec2(0.006303534, -0.001227349),                            // bend_high: 
     vec4(0.7690234, -0.39006528, 0.056888446, 0.061820567),     // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.08834498, -0.038719773),                            // spread_high: 
-    vec4(1.1297681, -0.20916545, 0.06399265, 0.041727543),      // path: mean path over that of the refracted direction
-    vec2(-0.020676017, -0.0021613836),                          // path_high: 
+    vec4(1.1297681, -0.20916533, 0.06399265, 0.041727304),      // path: mean path over that of the refracted direction
+    vec2(-0.020675898, -0.0021611452),                          // path_high: 
     vec4(0.3402057, -0.6483584, 0.3542442, -0.015058003),       // theta: scale of the path's distribution
     vec2(-0.08199707, 0.081555456)                              // theta_high: 
 );
@@ -87,21 +87,21 @@ const Conductor lf_copper = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.1675806, 0.10170162, 0.02775317),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.018923344, -0.008577919, -0.0010812539),  // c1: 
-    vec3(0.0015019253, 0.0011722613, 0.00057315035),  // c2: 
-    vec3(0.018531963, 0.010770738, 0.0037698243),     // c3: 
-    vec3(-0.04412248, -0.02682735, -0.0069667688),    // c4: 
-    vec3(-0.045224853, -0.027398728, -0.0077276193)   // c5: 
+    vec3(0.46140078, 0.35617423, 0.18159638),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.04897762, -0.02723708, -0.0058065653),  // c1: 
+    vec3(0.006208852, 0.0050466657, 0.003789235),   // c2: 
+    vec3(0.05291173, 0.036968768, 0.022788197),     // c3: 
+    vec3(-0.11507855, -0.08804251, -0.042115636),   // c4: 
+    vec3(-0.11942315, -0.09002751, -0.046424523)    // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.78200567, 0.4506484, 0.25726125),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.079284474, -0.04418256, -0.023410093),  // c1: 
-    vec3(0.021213412, 0.017324053, 0.019338354),    // c2: 
-    vec3(0.06003815, 0.037514925, 0.04513529),      // c3: 
-    vec3(-0.1466034, -0.09743278, -0.07159779),     // c4: 
-    vec3(-0.14687759, -0.09504476, -0.07995607)     // c5: 
+    vec3(0.779007, 0.4504561, 0.2588784),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0783916, -0.04389602, -0.023447432),   // c1: 
+    vec3(0.02200608, 0.018041283, 0.019702472),    // c2: 
+    vec3(0.062012613, 0.039598256, 0.045997202),   // c3: 
+    vec3(-0.14751038, -0.09855473, -0.072386235),  // c4: 
+    vec3(-0.14874923, -0.09715325, -0.081057236)   // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -140,12 +140,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
@@ -300,7 +300,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_copper.eta, lf_copper.k);
     float rise = 1.0 + 0.468 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * shares.base;
-    vec3 again = 0.5 * F2 * (lf_amount(lf_lacquer_again, crossing.s) + lf_amount(lf_lacquer_again, crossing2.s));
+    vec3 again = F2 * (lf_amount(lf_lacquer_again, crossing.s) * lf_amount(lf_lacquer_again, crossing2.s));
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_copper.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_copper.alpha, lf_lacquer.alpha));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, lf_copper.alpha);

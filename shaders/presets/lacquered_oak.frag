@@ -17,7 +17,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -51,12 +51,12 @@ const Interface lf_lacquer_interface = Interface(
     0.11758662,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.051513065, 0.0059220353, 0.011182629, 0.04249962),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0011268947, -0.016593136),                           // passed_high: the other two, of higher powers
-    vec4(0.15997663, -0.15549923, -0.020663086, 0.030586995),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.009913275, -0.0038092807),                           // bend_high: 
+    vec4(0.22668222, 0.10366632, 0.013775408, -0.020391881),    // bend: part by which the sine of light becomes smaller below
+    vec2(-0.006608844, 0.0025399923),                           // bend_high: 
     vec4(0.67365825, -0.17226803, -0.10509278, 0.01729983),     // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.011321053, -0.033619165),                           // spread_high: 
-    vec4(1.2000802, -0.23994064, -0.020671934, 0.067613125),    // path: mean path over that of the refracted direction
-    vec2(0.011690021, -0.010590792),                            // path_high: 
+    vec4(1.2000802, -0.2399407, -0.020672172, 0.0676136),       // path: mean path over that of the refracted direction
+    vec2(0.011690021, -0.01059103),                             // path_high: 
     vec4(0.59302557, -0.9069695, 0.14514132, 0.23783478),       // theta: scale of the path's distribution
     vec2(-0.018604606, -0.007173978)                            // theta_high: 
 );
@@ -117,12 +117,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

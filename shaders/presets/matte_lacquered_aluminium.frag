@@ -19,7 +19,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -70,12 +70,12 @@ const Interface lf_lacquer_interface = Interface(
     0.23253432,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.117580555, 0.06625485, -0.008904142, 0.026615268),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.019321598, -0.003716942),                            // passed_high: the other two, of higher powers
-    vec4(0.25976497, -0.125767, -0.07634101, -0.027794093),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.01541426, 0.016349174),                              // bend_high: 
+    vec4(0.16015665, 0.08384476, 0.050894096, 0.018529266),     // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0102761835, -0.010899454),                          // bend_high: 
     vec4(0.47685713, 0.016207732, -0.037082642, -0.043587685),  // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.036313757, -0.016467094),                           // spread_high: 
-    vec4(1.2581091, -0.23291034, -0.06929138, 0.040068626),     // path: mean path over that of the refracted direction
-    vec2(0.022292376, 8.940697e-06),                            // path_high: 
+    vec4(1.2581091, -0.23291022, -0.06929174, 0.04006815),      // path: mean path over that of the refracted direction
+    vec2(0.022292495, 9.179115e-06),                            // path_high: 
     vec4(0.86954325, -1.0685096, -0.09935013, 0.33906257),      // theta: scale of the path's distribution
     vec2(0.066010416, -0.044408634)                             // theta_high: 
 );
@@ -87,21 +87,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.26978025, 0.26805905, 0.26100323),        // c0: coefficients of the powers of the curves' argument
-    vec3(0.008600671, 0.008859184, 0.0103052445),    // c1: 
-    vec3(0.0011033192, 0.0013587549, 0.0022478774),  // c2: 
-    vec3(0.0117889345, 0.011133149, 0.008557767),    // c3: 
-    vec3(-0.07892432, -0.07841607, -0.076720566),    // c4: 
-    vec3(-0.079669595, -0.07872501, -0.07526457)     // c5: 
+    vec3(0.5786731, 0.5761039, 0.5669507),            // c0: coefficients of the powers of the curves' argument
+    vec3(0.01003807, 0.010405466, 0.013401136),       // c1: 
+    vec3(-0.020763643, -0.020173281, -0.017816842),   // c2: 
+    vec3(-0.0059741437, -0.007120937, -0.011303633),  // c3: 
+    vec3(-0.14492314, -0.144252, -0.14286658),        // c4: 
+    vec3(-0.13510427, -0.13359776, -0.1289601)        // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.74982375, 0.7397908, 0.7306932),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.056475654, -0.05554834, -0.05200597),     // c1: 
-    vec3(-0.002966687, -0.003355667, -0.0031293929),  // c2: 
-    vec3(0.070026636, 0.06670642, 0.058742404),       // c3: 
-    vec3(-0.14283913, -0.14037585, -0.13825351),      // c4: 
-    vec3(-0.17314887, -0.1690082, -0.16210467)        // c5: 
+    vec3(0.75087786, 0.7406517, 0.73172146),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.057133973, -0.05617909, -0.052613795),     // c1: 
+    vec3(-0.0044632405, -0.004872054, -0.0046806484),  // c2: 
+    vec3(0.06858915, 0.06518227, 0.057091296),         // c3: 
+    vec3(-0.14187452, -0.13935739, -0.13723531),       // c4: 
+    vec3(-0.17183894, -0.16760176, -0.16063243)        // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -140,12 +140,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = min((1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta, 1.0);
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = max(lf_curve(interface_.bend, interface_.bend_high, s), 0.0);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
@@ -300,7 +300,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float rise = 1.0 + 0.468 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * shares.base;
-    vec3 again = 0.5 * F2 * (lf_amount(lf_lacquer_again, crossing.s) + lf_amount(lf_lacquer_again, crossing2.s));
+    vec3 again = F2 * (lf_amount(lf_lacquer_again, crossing.s) * lf_amount(lf_lacquer_again, crossing2.s));
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_lacquer.alpha));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, lf_aluminium.alpha);

@@ -89,7 +89,7 @@ const Flakes lf_flakes = Flakes(
     0.0                                  // seed: whole number; another one, other flakes
 );
 
-const vec3 lf_flakes_returned = vec3(1.0000699, 1.0012773, 1.1019056);
+const vec3 lf_flakes_returned = vec3(1.0000739, 1.0013238, 1.1035608);
 
 const vec3 lf_flakes_lobes = vec3(0.38999027, 0.39579827, 0.40050954);
 

@@ -89,7 +89,7 @@ const Flakes lf_flakes = Flakes(
     0.0                                  // seed: whole number; another one, other flakes
 );
 
-const vec3 lf_flakes_returned = vec3(1.1321957, 1.0002629, 1.000105);
+const vec3 lf_flakes_returned = vec3(1.1343322, 1.0002759, 1.0001109);
 
 const vec3 lf_flakes_lobes = vec3(0.38999027, 0.39579827, 0.40050954);
 

@@ -201,10 +201,9 @@ float lf_slope_spread(float c, float eta) {
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
 Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c2 = lf_rarer_cosine(c, coat.eta);
-    vec3 t = lf_film_on_coat2(coat, c2);
-    vec3 below = 1.0 - min(max(lf_fresnel_schlick(c2, t) * 200.0, 0.0), 1.0);
-    vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c2 * (5.0 - c2 * (10.0 - c2 * (10.0 - c2 * (5.0 - c2))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
+    vec3 t = lf_film_on_coat2(coat, c);
+    vec3 below = 1.0 - min(max(lf_fresnel_schlick(c, t) * 200.0, 0.0), 1.0);
+    vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c * (5.0 - c * (10.0 - c * (10.0 - c * (5.0 - c))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
     vec4 below2 = lf_refract_about_normal(air, interface_.n);
     return Crossing(below2, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);

@@ -18,7 +18,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -53,11 +53,11 @@ const Interface lf_oil_interface = Interface(
     0.21274194,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.102022186, 0.05346267, -0.00935491, 0.032929197),    // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.017657153, -0.007665964),                             // passed_high: the other two, of higher powers
-    vec4(0.23614359, -0.13058884, -0.07147114, -0.016634904),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.018470109, 0.013866931),                              // bend_high: 
+    vec4(0.16476789, 0.08823583, 0.04829134, 0.011239201),       // bend: part by which the sine of light becomes smaller below
+    vec2(-0.012479812, -0.0093691945),                           // bend_high: 
     vec4(0.49851844, 0.0006311983, -0.054577872, -0.049606323),  // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.030749634, -0.01205802),                             // spread_high: 
-    vec4(1.2460318, -0.2314046, -0.064879, 0.04211855),          // path: mean path over that of the refracted direction
+    vec4(1.2460318, -0.23140419, -0.06487888, 0.042119026),      // path: mean path over that of the refracted direction
     vec2(0.02292329, 0.00061380863),                             // path_high: 
     vec4(0.8084004, -1.0369201, -0.056403957, 0.32752085),       // theta: scale of the path's distribution
     vec2(0.052598123, -0.038988426)                              // theta_high: 
@@ -119,12 +119,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = min((1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta, 1.0);
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = max(lf_curve(interface_.bend, interface_.bend_high, s), 0.0);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

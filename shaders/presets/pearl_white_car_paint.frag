@@ -100,7 +100,7 @@ const Lambert lf_white = Lambert(
     vec3(0.8, 0.8, 0.78)   // albedo: part of the light that is sent back
 );
 
-const vec3 lf_white_returned = vec3(1.8944926, 1.8957964, 2.0250332);
+const vec3 lf_white_returned = vec3(1.9208039, 1.9228877, 2.048475);
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
@@ -265,10 +265,9 @@ vec3 lf_with_second_facet(vec3 T, float gain) {
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
 Crossing2 lf_cross(Interface interface_, Coat2 coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float c2 = lf_rarer_cosine(c, coat.eta);
-    vec3 t = lf_film_on_coat(coat, c2);
-    vec3 below = 1.0 - min(max(lf_fresnel_schlick(c2, t) * 200.0, 0.0), 1.0);
-    vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c2 * (5.0 - c2 * (10.0 - c2 * (10.0 - c2 * (5.0 - c2))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
+    vec3 t = lf_film_on_coat(coat, c);
+    vec3 below = 1.0 - min(max(lf_fresnel_schlick(c, t) * 200.0, 0.0), 1.0);
+    vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c * (5.0 - c * (10.0 - c * (10.0 - c * (5.0 - c))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
     vec4 below2 = lf_refract_about_normal(air, interface_.n);
     return Crossing2(below2, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);

@@ -17,7 +17,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -50,11 +50,11 @@ const Interface lf_lacquer_interface = Interface(
     0.0015962153,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.009549635, 0.021495357, -0.023831615, 0.015080304),   // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.006754711, -0.0102405865),                             // passed_high: the other two, of higher powers
-    vec4(0.003664461, -0.00691487, 0.0020934881, -0.0009270547),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.011122103, -0.008937338),                              // bend_high: 
+    vec4(0.35662532, 0.0044327155, -0.0013419092, 0.0005939007),  // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0071296543, 0.0057293177),                            // bend_high: 
     vec4(0.75904995, -0.2263068, -0.12822342, -0.057531953),      // spread: width of a lobe seen through it, over that of the facets
     vec2(0.45303166, -0.40356708),                                // spread_high: 
-    vec4(1.009647, -0.020205349, 0.0140322745, -0.017401814),     // path: mean path over that of the refracted direction
+    vec4(1.0096471, -0.02020517, 0.014032036, -0.017403007),      // path: mean path over that of the refracted direction
     vec2(0.037196398, -0.023304224),                              // path_high: 
     vec4(0.020879557, -0.03627545, 0.011439269, -0.084810555),    // theta: scale of the path's distribution
     vec2(0.14554596, -0.042862482)                                // theta_high: 
@@ -102,12 +102,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

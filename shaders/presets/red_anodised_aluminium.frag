@@ -19,7 +19,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -70,12 +70,12 @@ const Interface lf_oxide_interface = Interface(
     0.10031511,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.04464719, 0.00010519335, 0.016922252, 0.03386515),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0017023832, -0.012983762),                          // passed_high: the other two, of higher powers
-    vec4(0.17456408, -0.18511207, -0.0043630255, 0.038041946),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.00433427, -0.0060364865),                            // bend_high: 
+    vec4(0.28814295, 0.11218918, 0.0026443005, -0.02305597),    // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0026268214, 0.0036585927),                          // bend_high: 
     vec4(0.79491526, -0.2609493, -0.08429666, 0.0621534),       // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.023329884, -0.05259615),                            // spread_high: 
-    vec4(1.1995243, -0.24667987, -0.003308177, 0.06897068),     // path: mean path over that of the refracted direction
-    vec2(0.004082501, -0.013128996),                            // path_high: 
+    vec4(1.1995242, -0.24667993, -0.0033078194, 0.0689702),     // path: mean path over that of the refracted direction
+    vec2(0.004082024, -0.013128281),                            // path_high: 
     vec4(0.6451652, -0.96579504, 0.16259342, 0.2337165),        // theta: scale of the path's distribution
     vec2(-0.020245273, 0.0012745932)                            // theta_high: 
 );
@@ -87,21 +87,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.23598553, 0.009446396, 0.013970923),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0018371381, 0.0009900501, 0.0013158042),     // c1: 
-    vec3(-0.00017692894, 0.00013058586, 0.00020230422),  // c2: 
-    vec3(0.02096942, 0.00079319905, 0.0012610499),       // c3: 
-    vec3(-0.025554813, -0.00029719993, -0.0006149998),   // c4: 
-    vec3(-0.035292953, -0.0008371426, -0.0014300738)     // c5: 
+    vec3(0.50833756, 0.09431362, 0.115510516),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.012242347, 0.008892648, 0.009700999),    // c1: 
+    vec3(0.0005174726, 0.0009992793, 0.0012087971),  // c2: 
+    vec3(0.05289668, 0.007324919, 0.009552032),      // c3: 
+    vec3(-0.05764675, -0.002809666, -0.0046914294),  // c4: 
+    vec3(-0.08288944, -0.007816762, -0.010921136)    // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.71114016, 0.22015995, 0.2501617),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.027400091, -0.0022967122, -0.002828829),  // c1: 
-    vec3(0.013535261, 0.010971412, 0.010952234),      // c2: 
-    vec3(0.037034333, 0.024226218, 0.024282217),      // c3: 
-    vec3(-0.07314843, -0.027332574, -0.029907405),    // c4: 
-    vec3(-0.08125186, -0.035438, -0.037620604)        // c5: 
+    vec3(0.7138674, 0.2263956, 0.25687462),            // c0: coefficients of the powers of the curves' argument
+    vec3(-0.027169913, -0.0023563653, -0.0028964654),  // c1: 
+    vec3(0.013744593, 0.011364929, 0.011354789),       // c2: 
+    vec3(0.037334263, 0.025064826, 0.025139183),       // c3: 
+    vec3(-0.07346606, -0.028174885, -0.030802175),     // c4: 
+    vec3(-0.081643164, -0.036571145, -0.03880596)      // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -140,12 +140,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.
@@ -300,7 +300,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float rise = 1.0 + 0.468 * lf_presence(lf_oxide.eta) * lf_oxide.alpha * lf_oxide.alpha * shares.base;
-    vec3 again = 0.5 * F2 * (lf_amount(lf_oxide_again, crossing.s) + lf_amount(lf_oxide_again, crossing2.s));
+    vec3 again = F2 * (lf_amount(lf_oxide_again, crossing.s) * lf_amount(lf_oxide_again, crossing2.s));
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_oxide.alpha));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, lf_aluminium.alpha);

@@ -18,7 +18,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -52,12 +52,12 @@ const Interface lf_urushi_interface = Interface(
     0.006316437,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.019861361, 0.03569795, -0.021563128, 0.00021134847),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.018127924, -0.0131169055),                             // passed_high: the other two, of higher powers
-    vec4(0.012738822, -0.02335022, 0.017746096, -0.013947411),    // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.014163258, -0.0065295324),                             // bend_high: 
+    vec4(0.33807915, 0.015261583, -0.011598721, 0.009115875),     // bend: part by which the sine of light becomes smaller below
+    vec2(-0.009256974, 0.0042676926),                             // bend_high: 
     vec4(0.7574944, -0.30959716, 0.21663982, -0.3939808),         // spread: width of a lobe seen through it, over that of the facets
     vec2(0.14949118, -0.03164667),                                // spread_high: 
-    vec4(1.028744, -0.061100483, 0.06624964, -0.053946853),       // path: mean path over that of the refracted direction
-    vec2(0.014147878, 0.0067489147),                              // path_high: 
+    vec4(1.028744, -0.061100602, 0.06624982, -0.0539459),         // path: mean path over that of the refracted direction
+    vec2(0.014147639, 0.006748438),                               // path_high: 
     vec4(0.06297798, -0.1371728, 0.16691335, -0.22109175),        // theta: scale of the path's distribution
     vec2(0.1095863, 0.037178833)                                  // theta_high: 
 );
@@ -104,12 +104,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

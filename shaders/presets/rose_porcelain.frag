@@ -17,7 +17,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -46,18 +46,18 @@ const Coat lf_glaze = Coat(
 );
 
 const Interface lf_glaze_interface = Interface(
-    0.0054883463,                                                 // tilt: turn of the mean facet towards a grazing direction
-    0.0035753467,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.0151992105, 0.03096597, -0.026210945, 0.008551259),   // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.015562363, -0.01404037),                               // passed_high: the other two, of higher powers
-    vec4(0.007215311, -0.013483647, 0.008252899, -0.0067420173),  // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.014364195, -0.009246089),                              // bend_high: 
-    vec4(0.73397744, -0.26290506, 0.06938703, -0.28459442),       // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.29432896, -0.17842531),                                // spread_high: 
-    vec4(1.0184151, -0.03971079, 0.042724967, -0.04176557),       // path: mean path over that of the refracted direction
-    vec2(0.027597368, -0.006858945),                              // path_high: 
-    vec4(0.03754024, -0.07790418, 0.08442601, -0.15448993),       // theta: scale of the path's distribution
-    vec2(0.13333824, -0.008031782)                                // theta_high: 
+    0.0054883463,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.0035753467,                                                // gain: part of the reflected light that a second facet lets in
+    vec4(-0.0151992105, 0.03096597, -0.026210945, 0.008551259),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.015562363, -0.01404037),                              // passed_high: the other two, of higher powers
+    vec4(0.3285231, 0.00898914, -0.0055016875, 0.004494518),     // bend: part by which the sine of light becomes smaller below
+    vec2(-0.009576365, 0.006164044),                             // bend_high: 
+    vec4(0.73397744, -0.26290506, 0.06938703, -0.28459442),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.29432896, -0.17842531),                               // spread_high: 
+    vec4(1.0184151, -0.03971097, 0.042725146, -0.041764855),     // path: mean path over that of the refracted direction
+    vec2(0.027597368, -0.0068594217),                            // path_high: 
+    vec4(0.03754024, -0.07790418, 0.08442601, -0.15448993),      // theta: scale of the path's distribution
+    vec2(0.13333824, -0.008031782)                               // theta_high: 
 );
 
 const Lambert lf_paint = Lambert(
@@ -102,12 +102,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

@@ -17,7 +17,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -50,12 +50,12 @@ const Interface lf_surface_interface = Interface(
     0.23253432,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.117580555, 0.06625485, -0.008904142, 0.026615268),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.019321598, -0.003716942),                            // passed_high: the other two, of higher powers
-    vec4(0.25976497, -0.125767, -0.07634101, -0.027794093),     // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.01541426, 0.016349174),                              // bend_high: 
+    vec4(0.16015665, 0.08384476, 0.050894096, 0.018529266),     // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0102761835, -0.010899454),                          // bend_high: 
     vec4(0.47685713, 0.016207732, -0.037082642, -0.043587685),  // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.036313757, -0.016467094),                           // spread_high: 
-    vec4(1.2581091, -0.2329101, -0.069290906, 0.040067196),     // path: mean path over that of the refracted direction
-    vec2(0.022291899, 1.013279e-05),                            // path_high: 
+    vec4(1.2581091, -0.23291028, -0.0692915, 0.04006815),       // path: mean path over that of the refracted direction
+    vec2(0.022292256, 9.179115e-06),                            // path_high: 
     vec4(0.86954325, -1.0685096, -0.09935013, 0.33906257),      // theta: scale of the path's distribution
     vec2(0.066010416, -0.044408634)                             // theta_high: 
 );
@@ -102,12 +102,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = min((1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta, 1.0);
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = max(lf_curve(interface_.bend, interface_.bend_high, s), 0.0);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

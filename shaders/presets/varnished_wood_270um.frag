@@ -18,7 +18,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -53,12 +53,12 @@ const Interface lf_varnish_interface = Interface(
     0.02422721,                                                // gain: part of the reflected light that a second facet lets in
     vec4(-0.0321689, 0.029983805, 0.015549282, -0.015668225),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0009908297, -1.5788479e-05),                        // passed_high: the other two, of higher powers
-    vec4(0.04254398, -0.0714967, 0.046763185, -0.016578522),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(-0.005647372, 0.0077653723),                          // bend_high: 
+    vec4(0.30497074, 0.047664583, -0.03117545, 0.011052132),   // bend: part by which the sine of light becomes smaller below
+    vec2(0.003764987, -0.005176604),                           // bend_high: 
     vec4(0.7752975, -0.4359295, 0.25017366, -0.13368165),      // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.13237008, 0.048883975),                            // spread_high: 
-    vec4(1.080001, -0.1521383, 0.09882036, -0.01597774),       // path: mean path over that of the refracted direction
-    vec2(-0.025762916, 0.01699841),                            // path_high: 
+    vec4(1.0800009, -0.15213847, 0.098820835, -0.015977979),   // path: mean path over that of the refracted direction
+    vec2(-0.025763214, 0.016999125),                           // path_high: 
     vec4(0.19103706, -0.40984368, 0.36370075, -0.20119762),    // theta: scale of the path's distribution
     vec2(-0.042300656, 0.12330281)                             // theta_high: 
 );
@@ -119,12 +119,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

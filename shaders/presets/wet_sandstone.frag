@@ -17,7 +17,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -51,12 +51,12 @@ const Interface lf_water_interface = Interface(
     0.009790741,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.026004575, 0.04301408, -0.014314687, -0.010176732),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.016221277, -0.00915219),                              // passed_high: the other two, of higher powers
-    vec4(0.013477275, -0.02535109, 0.021349104, -0.014621947),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(0.0060912133, -6.445672e-05),                           // bend_high: 
+    vec4(0.23798709, 0.019061, -0.016051926, 0.010993689),       // bend: part by which the sine of light becomes smaller below
+    vec2(-0.004579872, 4.8696995e-05),                           // bend_high: 
     vec4(0.62818056, -0.31912512, 0.21570803, -0.312871),        // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.00026713312, 0.06709802),                            // spread_high: 
-    vec4(1.0396754, -0.087372005, 0.08643025, -0.052160025),     // path: mean path over that of the refracted direction
-    vec2(-0.005214095, 0.01943636),                              // path_high: 
+    vec4(1.0396754, -0.087371826, 0.08643061, -0.052159548),     // path: mean path over that of the refracted direction
+    vec2(-0.0052142143, 0.01943636),                             // path_high: 
     vec4(0.06900233, -0.16027227, 0.19247234, -0.19428445),      // theta: scale of the path's distribution
     vec2(0.05203541, 0.05342995)                                 // theta_high: 
 );
@@ -117,12 +117,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // The cosine between either direction and their half vector.

@@ -217,6 +217,11 @@ float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) 
     return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
+// Cosine below a boundary of relative index `eta` (Snell's law); 0 under total internal reflection.
+float lf_cosine_below(float c, float eta) {
+    return sqrt((eta - 1.0) * (eta + 1.0) + c * c) * (1.0 / eta);
+}
+
 // Width of the refracted directions over the width of the facets, to first order in slope.
 float lf_slope_spread2(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
@@ -227,7 +232,8 @@ float lf_slope_spread2(float c, float eta) {
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
 Crossing lf_cross2(Interface interface_, Coat coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    float T = lf_with_second_facet(lf_transmittance_dielectric(w.w, coat.eta), interface_.gain);
+    float rarer = lf_cosine_below(air.w, interface_.n);
+    float T = lf_with_second_facet(lf_transmittance_dielectric(rarer, 1.0 / coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
     vec4 below = lf_refract_about_normal(air, interface_.n);
     return Crossing(below, T, lf_slope_spread2(c, coat.eta), interface_.lengthening + grazing, grazing);

@@ -55,7 +55,7 @@ const Pigment lf_rust_pigment = Pigment(
     vec3(0.060000002, 0.030000001, 0.012),  // S: scattering of diffuse light [1/um]
     0.7,                                    // alpha: width of the facet slopes of its boundary
     1.9,                                    // eta: index of refraction, against air
-    0.23615637                              // escape: part of diffuse light from below that passes its boundary
+    0.2361564                               // escape: part of diffuse light from below that passes its boundary
 );
 
 const Growth lf_rust_growth = Growth(

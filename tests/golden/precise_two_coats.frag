@@ -19,7 +19,7 @@ struct Interface {
     float gain;        // part of the reflected light that a second facet lets in
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
-    vec4 bend;         // sine of the refracted light over that at a smooth interface, beyond 1
+    vec4 bend;         // part by which the sine of light becomes smaller below
     vec2 bend_high;    // 
     vec4 spread;       // width of a lobe seen through it, over that of the facets
     vec2 spread_high;  // 
@@ -76,8 +76,8 @@ const Interface lf_coat_top = Interface(
     0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.035054997, 0.020641431, 0.025624495, -0.0064411927),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0061165085, -0.00076546334),                          // passed_high: the other two, of higher powers
-    vec4(0.06184196, -0.096420236, 0.046584222, -0.0025666347),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(-0.009934818, 0.005613242),                              // bend_high: 
+    vec4(0.29210538, 0.0642801, -0.031056285, 0.0017112494),      // bend: part by which the sine of light becomes smaller below
+    vec2(0.0066233575, -0.0037422478),                            // bend_high: 
     vec4(0.7778974, -0.42731008, 0.14473301, 0.0003119707),       // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.11521681, -0.009224892),                              // spread_high: 
     vec4(1.1060052, -0.18565032, 0.08457264, 0.017342567),        // path: mean path over that of the refracted direction
@@ -91,41 +91,41 @@ const Interface lf_coat_both = Interface(
     0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.035054997, 0.020641431, 0.025624495, -0.0064411927),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0061165085, -0.00076546334),                          // passed_high: the other two, of higher powers
-    vec4(-0.09620379, -0.08588411, 0.040890552, -0.0041511953),   // bend: sine of the refracted light over that at a smooth interface, beyond 1
-    vec2(-0.010286503, 0.0039637834),                             // bend_high: 
+    vec4(0.4084071, 0.058477, -0.027564928, -0.024196982),        // bend: part by which the sine of light becomes smaller below
+    vec2(0.004704416, 0.0075178742),                              // bend_high: 
     vec4(0.09954319, -0.03336258, 0.012172839, -0.000896357),     // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.011329744, -0.0025816858),                            // spread_high: 
-    vec4(1.0546784, -0.071492076, 0.017656565, 0.017326593),      // path: mean path over that of the refracted direction
-    vec2(-0.010948837, -0.0020993948),                            // path_high: 
-    vec4(0.08373786, -0.15304142, 0.076810524, 0.021043582),      // theta: scale of the path's distribution
-    vec2(-0.03042803, 0.017840791)                                // theta_high: 
+    vec4(1.0546787, -0.07149202, 0.017656773, 0.017326474),       // path: mean path over that of the refracted direction
+    vec2(-0.010948896, -0.0020992756),                            // path_high: 
+    vec4(0.08373746, -0.15304106, 0.07681082, 0.021044184),       // theta: scale of the path's distribution
+    vec2(-0.030428441, 0.0178402)                                 // theta_high: 
 );
 
 const Curve lf_coat_passed = Curve(
-    vec3(0.98885643, 0.9825332, 0.9749934),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0048447847, 0.0019959807, 0.008327693),    // c1: 
-    vec3(-0.008213818, -0.0080194175, -0.0050720274),  // c2: 
-    vec3(-0.003549695, -0.00045204163, 0.0027159452),  // c3: 
-    vec3(0.008597374, 0.007260442, 0.005341053),       // c4: 
-    vec3(0.008965015, 0.006336689, 0.003130436)        // c5: 
+    vec3(0.98885643, 0.9825332, 0.9749934),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0048447847, 0.0019959211, 0.008327633),   // c1: 
+    vec3(-0.008213818, -0.008019477, -0.0050720274),  // c2: 
+    vec3(-0.003549695, -0.0004518032, 0.0027161837),  // c3: 
+    vec3(0.008597374, 0.0072605014, 0.005341053),     // c4: 
+    vec3(0.008965015, 0.006336689, 0.0031301975)      // c5: 
 );
 
 const Curve lf_coat_inner_again = Curve(
-    vec3(0.4179882, 0.20252796, 0.051290553),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.11138961, -0.038174868, -0.0070435656),  // c1: 
-    vec3(-0.010335572, 0.010543928, 0.0037405444),   // c2: 
-    vec3(-0.013854086, 0.002419129, 0.006826367),    // c3: 
-    vec3(-0.0576986, -0.04098332, -0.011538604),     // c4: 
-    vec3(-0.046957374, -0.038040474, -0.013467476)   // c5: 
+    vec3(0.68565, 0.4859706, 0.24335311),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.17177114, -0.08744605, -0.031251997),   // c1: 
+    vec3(0.007447973, 0.028321177, 0.018363692),    // c2: 
+    vec3(-0.005469978, 0.01605329, 0.03381288),     // c3: 
+    vec3(-0.105131224, -0.09610081, -0.052035764),  // c4: 
+    vec3(-0.08790657, -0.09205216, -0.062161952)    // c5: 
 );
 
 const Curve lf_coat_inner_rest = Curve(
-    vec3(0.09805314, 0.07698309, 0.049282067),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.020066546, -0.0134933945, -0.006903533),   // c1: 
-    vec3(-0.0010522045, 0.0019353423, 0.0010899659),   // c2: 
-    vec3(-0.015770428, -0.0074732043, -0.0020022579),  // c3: 
-    vec3(-0.011498058, -0.012468461, -0.008895351),    // c4: 
-    vec3(-0.00020448864, -0.006140966, -0.006234452)   // c5: 
+    vec3(0.09114473, 0.074156426, 0.048794918),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.017879615, -0.012615352, -0.0066391244),    // c1: 
+    vec3(-0.00023009628, 0.0017982423, 0.0009799618),   // c2: 
+    vec3(-0.012969289, -0.006727636, -0.0021987557),    // c3: 
+    vec3(-0.0117995925, -0.01217526, -0.008717734),     // c4: 
+    vec3(-0.0020358562, -0.0063103773, -0.0059840716)   // c5: 
 );
 
 const Conductor lf_base = Conductor(
@@ -135,21 +135,21 @@ const Conductor lf_base = Conductor(
 );
 
 const Curve lf_coat_again = Curve(
-    vec3(0.113116995, 0.19614387, 0.09464168),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.003125159, -0.009682316, -0.008773306),  // c1: 
-    vec3(0.009188551, 0.012916118, 0.0062840655),    // c2: 
-    vec3(0.003690794, -0.002083853, 0.0048566237),   // c3: 
-    vec3(-0.019095294, -0.03156826, -0.017753974),   // c4: 
-    vec3(-0.013327986, -0.017953917, -0.015910782)   // c5: 
+    vec3(0.34190425, 0.44525877, 0.3117587),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0076829195, -0.014326312, -0.03012291),  // c1: 
+    vec3(0.022623107, 0.021969259, 0.021054395),     // c2: 
+    vec3(-0.008443922, -0.044234097, 0.014635891),   // c3: 
+    vec3(-0.04978493, -0.062267765, -0.060303077),   // c4: 
+    vec3(-0.021756023, -0.008505821, -0.052791387)   // c5: 
 );
 
 const Curve lf_coat_rest = Curve(
-    vec3(0.47580683, 0.37167534, 0.24029636),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.013003029, -0.016848952, -0.022144116),  // c1: 
-    vec3(0.04136744, 0.015886202, 0.006957695),      // c2: 
-    vec3(0.032524347, -0.0036183, 0.00915277),       // c3: 
-    vec3(-0.072989866, -0.03821455, -0.027350068),   // c4: 
-    vec3(-0.065988004, -0.023336709, -0.028268516)   // c5: 
+    vec3(0.5050539, 0.4054654, 0.29577416),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.013735659, -0.018116161, -0.026982486),  // c1: 
+    vec3(0.044115603, 0.01823616, 0.009027667),      // c2: 
+    vec3(0.034742534, -0.0028259456, 0.011534154),   // c3: 
+    vec3(-0.07766682, -0.042704776, -0.034259334),   // c4: 
+    vec3(-0.07025343, -0.026753694, -0.035301536)    // c5: 
 );
 
 // The cosine between either direction and their half vector.
@@ -232,12 +232,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = (1.0 + lf_curve(interface_.bend, interface_.bend_high, s)) / eta;
-    float z = sqrt(w.w * w.w + (1.0 - bend) * (1.0 + bend) * dot(w.xyz, w.xyz));
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
+    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * bend, z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -370,7 +370,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float h2 = dot(h, h);
     float F2 = lf_fresnel_dielectric(min(0.5 * sqrt(h2), 1.0), lf_primer.eta);
     float rise = 1.0 + 0.468 * lf_presence(lf_coat.eta) * lf_coat.alpha * lf_coat.alpha * shares.base;
-    vec3 again = 0.5 * F2 * (lf_amount(lf_coat_inner_again, crossing.s) + lf_amount(lf_coat_inner_again, crossing2.s));
+    vec3 again = F2 * (lf_amount(lf_coat_inner_again, crossing.s) * lf_amount(lf_coat_inner_again, crossing2.s));
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_primer.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_primer.alpha, lf_coat.alpha));
     vec3 root = lf_amount(lf_coat_inner_rest, crossing.s) * lf_amount(lf_coat_inner_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_coat.eta, lf_primer.alpha);
@@ -389,7 +389,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float h22 = dot(h, h);
     vec3 F3 = lf_fresnel_conductor(min(0.5 * sqrt(h22), 1.0), lf_base.eta, lf_base.k);
     rise = 1.0 + 0.468 * lf_presence(eta) * alpha * alpha * shares.base;
-    again = 0.5 * F3 * (lf_amount(lf_coat_again, crossing3.s) + lf_amount(lf_coat_again, crossing4.s));
+    again = F3 * (lf_amount(lf_coat_again, crossing3.s) * lf_amount(lf_coat_again, crossing4.s));
     vec3 lobes2 = rise * lf_lobe(crossing3, crossing4, h.w, lf_base.alpha) + again * lf_lobe(crossing3, crossing4, h.w, lf_wider(lf_base.alpha, alpha));
     root = lf_amount(lf_coat_rest, crossing3.s) * lf_amount(lf_coat_rest, crossing4.s);
     vec3 rest2 = root * root * lf_ahead(crossing3, crossing4, eta, lf_base.alpha);
