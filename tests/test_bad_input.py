@@ -216,7 +216,7 @@ MISUSED = {
     "fit scene.toml --ouput x": r"fit: No such option: --ouput .*--output.*`layerfit fit --help`",
     "fit scene.toml extra": r"unexpected extra argument.*extra.*`layerfit fit --help`",
     "fit scene.toml -o ''": r"an argument is empty: has a variable of the shell no value\?",
-    "fit scene.toml --starts ten": r"fit: Invalid value for '--starts'.*integer",
+    "fit scene.toml --starts ten": r"fit: Invalid value for '--starts'.*`layerfit fit --help`",
     "fit scene.toml --starts 1001": r"fit\.starts = 1001: should be a whole number from 1 to 1000",
     "fit scene.toml --loss hubert": r"fit\.loss = 'hubert': should be one of square, huber, cauchy \(did you mean 'huber'\?\)",
     "batch scene.toml --metric loog": r"metric = 'loog': should be one of .*did you mean 'log'",
@@ -236,9 +236,10 @@ MISUSED = {
     "export truth.json --max-error nan": r"a largest error of nan: it should be above 0",
     "export truth.json --to gltf --target essl300": r"--target, .* are of the shader: leave them out, or --to",
     "export truth.json --to gltf -o copper.mtlx": r"copper\.mtlx: --to gltf writes a file that ends in \.gltf",
-    "verify truth.json --fail nan": r"verify: Invalid value for '--fail'",
+    "verify truth.json --fail nan": r"--fail nan: should be a relative difference of 0 or more",
     "blender-kit -o .": r"\.: cannot be written: it is a directory.*the name of a file",
     "presets coper": r"no shipped preset has 'coper'.*did you mean 'copper'",
+    "study plan.toml -o new": r"plan\.toml: vary: unknown 'base\.alfa' \(did you mean 'base\.alpha'\?\)",
     "metal coppr": r"'coppr' is not known; near are copper\. `layerfit metal` lists",
 }
 """Wrong words by the message for them."""
@@ -247,6 +248,7 @@ MISUSED = {
 @pytest.mark.parametrize("words", MISUSED)
 def test_wrong_words_are_told_what_is_right(words, folder, monkeypatch):
     monkeypatch.chdir(folder)
+    Path("plan.toml").write_text(PLAN.replace("base.alpha", "base.alfa"))
     refuses(folder, shlex.split(words), MISUSED[words])
 
 

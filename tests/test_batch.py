@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from commands import layerfit
 from layerfit import InputError, fit_batch
 from layerfit.batch.sharing import fitted
 from layerfit.batch.table import JOURNAL
@@ -63,6 +64,13 @@ def test_every_scene_has_its_row(scenes, tmp_path):
     assert float(mended["base.alpha_x"]) == pytest.approx(0.08, rel=1e-4)
     third = fit_batch([manifest], tmp_path / "out", **QUICK)
     assert third.document["kept"] == 2, "a line after one that was cut off is lost"
+
+
+def test_a_scene_that_fails_is_named(scenes, tmp_path):
+    ran = layerfit("batch", scenes / "d.toml", "-o", tmp_path / "out")
+    assert ran.code == 1
+    assert ran.err.startswith(f"failed: {scenes / 'd.toml'}: ")
+    assert "lost.exr: cannot be read" in ran.err
 
 
 def test_a_batch_that_is_killed_goes_on(scenes, tmp_path):

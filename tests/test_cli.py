@@ -517,6 +517,8 @@ def test_presets_are_listed():
     assert [document["name"] for document in documents] == [line.split()[0] for line in lines if line.startswith("  ")]
     assert Path(documents[0]["path"]).is_file()
     assert layerfit("presets").out.count("\n") > len(lines)
+    both = layerfit("presets", "copper lacquer", "--json")
+    assert [document["name"] for document in json.loads(both.out)] == ["lacquered_copper"]
 
 
 def test_a_word_that_no_preset_has_is_said():

@@ -230,6 +230,9 @@ def verify_preset(
     stack: Stack, name: str, scene: Path | None, output: Path | None, fail: float | None, hardfail: float | None
 ) -> tuple[dict[str, Any], Path | None]:
     """Verify the shader of a material; returns the document of `layerfit verify --json` and where the picture is."""
+    for option, limit in (("--fail", fail), ("--hardfail", hardfail)):
+        if limit is not None and not limit >= 0.0:
+            raise InputError(f"{option} {limit:g}: should be a relative difference of 0 or more, such as 1e-5")
     if output is not None:
         if scene is None:
             raise InputError(f"{output}: there is no picture without a scene; name one after the preset, or leave -o out")

@@ -45,12 +45,13 @@ class Shipped:
 
 
 def shipped_presets(word: str = "") -> list[Shipped]:
-    """The presets that ship, by group and name; with a `word`, those that have it in what they say of themselves.
+    """The presets that ship, by group and name; with a `word`, those that have it, or all of several, in what
+    they say of themselves.
 
     `read_preset(name)` gives the material of one.
     """
     found = [_described(path) for path in (shaders() / "presets").glob("*.json")]
-    found = [one for one in found if word.casefold() in _text(one).casefold()]
+    found = [one for one in found if all(part in _text(one).casefold() for part in word.casefold().split())]
     return sorted(found, key=lambda one: (GROUPS.index(one.group), one.name))
 
 

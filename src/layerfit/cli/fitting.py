@@ -231,7 +231,8 @@ def batch(
         )
     for row in done.rows:
         if row["error"]:
-            say(f"failed: {row['error']}")
+            scene = "" if str(row["scene"]) in row["error"] else f"{row['scene']}: "
+            say(f"failed: {scene}{row['error']}")
     document = done.document
     say(f"{document['done']} done ({document['kept']} of them before), {document['failed']} failed: {document['table']}")
     given = {"--starts": starts, "--metric": metric, "--loss": loss, "--seed": seed}

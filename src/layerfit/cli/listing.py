@@ -15,7 +15,9 @@ from .talk import Done, progress, say, tell, tell_table
 def presets(
     word: Annotated[
         str,
-        typer.Argument(help="Part of a name, group, structure or description: copper, wood, flakes. Left out: all of them."),
+        typer.Argument(
+            help="Part of a name, group, structure or description, or several in quotes: copper, 'clear coat'. Left out: all of them."
+        ),
     ] = "",
 ) -> Done:
     """List the presets that ship.

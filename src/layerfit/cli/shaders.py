@@ -143,10 +143,10 @@ def verify(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the picture strip.")] = None,
     fail: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Relative difference from JAX that p99.9 of the values may have; left out, 1e-5."),
+        typer.Option(help="Relative difference from JAX that p99.9 of the values may have; left out, 1e-5."),
     ] = None,
     hardfail: Annotated[
-        float | None, typer.Option(min=0.0, help="Relative difference from JAX that any value may have; left out, 5e-5.")
+        float | None, typer.Option(help="Relative difference from JAX that any value may have; left out, 5e-5.")
     ] = None,
 ) -> Done:
     """Render a preset's shader in OpenGL and compare it with JAX.

@@ -75,8 +75,9 @@ def study(
     xarray = _xarray()
     made = read_plan(plan)
     trials = [(k, repeat) for k in range(len(made.points)) for repeat in range(made.repeats)]
+    where = "study" if isinstance(plan, Mapping) else str(plan)
     for point in made.points:
-        at_point(made.stack, made.setting, point, "study: vary")  # before any work is done
+        at_point(made.stack, made.setting, point, f"{where}: vary")  # before any work is done
     if directory is not None:
         check_directory(Path(directory))
     kept = None if directory is None else Journal(Path(directory) / JOURNAL)
