@@ -326,6 +326,8 @@ def test_a_phone_shows_a_long_name_and_the_picture_beside_the_sliders(browser, t
         page.evaluate("layerfit.views[0].limit = 0")
         page.set_viewport_size({"width": 360, "height": 740})
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        assert page.locator("h1").inner_text() == "metallic_blue_car_paint"
+        assert "blue_<wbr>car" in page.locator("h1").inner_html(), "it is broken between words"
         page.locator("fieldset input").last.scroll_into_view_if_needed()
         stage = page.locator(".stage").bounding_box()
         assert stage["y"] == 0.0, "the picture is in sight of the sliders"

@@ -16,7 +16,7 @@ HOST = "127.0.0.1"
 def page(stack: Stack, name: str) -> str:
     """A material as one HTML file: its exported shader, live, with a slider for every parameter."""
     about = f"{structure(stack)}, {model_name(stack)} form."
-    body = pages.filled("view.html", name=escape(name), about=escape(about))
+    body = pages.filled("view.html", name=escape(name), heading=pages.broken(name), about=escape(about))
     return pages.page(name, body, {"material": pages.as_json(viewer.live(stack, name))})
 
 

@@ -30,7 +30,7 @@ def _tiles(members: Iterable[Shipped]) -> str:
     """Each with its picture, which stands there until it is drawn live."""
     return "".join(
         f'<div class="tile" data-tile="{escape(preset.name)}"><div class="picture">{preset.picture}</div>'
-        f'<div class="about"><h3>{escape(preset.name)}</h3><p>{escape(preset.description)}</p>'
+        f'<div class="about"><h3>{pages.broken(preset.name)}</h3><p>{escape(preset.description)}</p>'
         f'<p class="soft">{escape(preset.structure)}</p></div></div>'
         for preset in members
     )

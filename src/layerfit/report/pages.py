@@ -30,6 +30,11 @@ def filled(name: str, /, **slots: str) -> str:
     return Template(text(name)).substitute(slots)
 
 
+def broken(name: str) -> str:
+    """A name as HTML that may be broken behind its underscores, and nowhere else where that is enough."""
+    return escape(name).replace("_", "_<wbr>")
+
+
 def page(title: str, body: str, data: Mapping[str, bytes] | None = None) -> str:
     """A whole page; `data` are read by its scripts, by their names. Without data there are no scripts."""
     held = (
