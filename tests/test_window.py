@@ -204,8 +204,10 @@ def screen() -> Iterator[str]:
             "no Xvfb for a window to open on: apt-get install -y --no-install-recommends xvfb libgl1-mesa-dri libglx-mesa0"
         )
     read, write = os.pipe()
+    # Not number 0, on which a program finds OpenGL whatever DISPLAY says: others are tried without a driver meanwhile.
+    number = f":{100 + os.getpid() % 900}"
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1200x800x24", "-nolisten", "tcp"],
+        ["Xvfb", number, "-displayfd", str(write), "-screen", "0", "1200x800x24", "-nolisten", "tcp"],
         pass_fds=[write],
         stderr=subprocess.DEVNULL,
     )
