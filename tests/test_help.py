@@ -30,6 +30,9 @@ LESS = {
 """Options that leave an example what it is and take most of its time away."""
 
 
+SLOW = ("fit", "structures", "batch", "advise", "truth", "tradeoff", "specialise", "demo")
+
+
 @pytest.fixture(scope="module")
 def workplace(tmp_path_factory):
     """Every file that an example names; in place of the references that ship, a small one."""
@@ -57,7 +60,7 @@ def workplace(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("example", EXAMPLES)
+@pytest.mark.parametrize("example", [pytest.param(e, marks=pytest.mark.slow if e.split()[1] in SLOW else ()) for e in EXAMPLES])
 def test_an_example_runs(example, workplace, gl, tmp_path, monkeypatch):
     folder = shutil.copytree(workplace, tmp_path / "here")
     monkeypatch.chdir(folder)
