@@ -15,7 +15,8 @@ from layerfit.forms.faithful import Faithful
 from layerfit.layers import Coat
 from layerfit.render import brdf_values
 from layerfit.shader.cost import ROUNDS, instructions, times
-from layerfit.shader.export import Shader, print_material, template
+from layerfit.shader.export import Shader, print_material
+from layerfit.shader.template import template
 from layerfit.shader.verify import shade_samples
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor

@@ -32,7 +32,7 @@ BRANCHES = [
     [
         {"shader.bounds", "shader.glsl", "shader.helpers", "shader.names"},
         {"shader.primitives", "shader.structs"},
-        {"shader.printer"},
+        {"shader.printer", "shader.template", "shader.values"},
         {"shader.export", "shader.program"},
         {"shader.gl"},
         {"shader.verify", "shader.cost"},

@@ -24,7 +24,8 @@ from layerfit.errors import MachineError
 from layerfit.fit.metrics import display
 from layerfit.preset import read_preset, stack_of
 from layerfit.shader import gl as gl_module
-from layerfit.shader.export import print_material, uniforms_of
+from layerfit.shader.export import print_material
+from layerfit.shader.values import uniforms_of
 from layerfit.window import picture, show
 from layerfit.window.panel import BAR, HEAD, LEAP, ROW, WIDTH, Panel
 from layerfit.window.picture import Camera, Picture, lights

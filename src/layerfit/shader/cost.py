@@ -20,8 +20,9 @@ from ..errors import InputError, MachineError
 from ..forms.corrected import Corrected
 from ..stack import Stack
 from ..surfaces import Phong
-from .export import Shader, template
+from .export import Shader
 from .gl import compile_points, context, float_target, in_software, renderer, set_uniforms
+from .template import template
 
 MOST_LIGHTS = 8
 SIDE = 1024

@@ -13,7 +13,8 @@ from ..documents import write_text
 from ..errors import LayerfitError, MachineError
 from ..preset import preset_of
 from ..report import pages
-from ..shader.export import HEADERS, print_material, uniforms_of
+from ..shader.export import HEADERS, print_material
+from ..shader.values import uniforms_of
 from ..stack import Stack
 from .panel import LEAP, STEP, WIDTH, Panel
 from .picture import Camera, Picture, replaced, toward
