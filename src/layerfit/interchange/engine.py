@@ -8,14 +8,11 @@ import jax.numpy as jnp
 from .._chunk import clip, safe_sqrt, static
 from .._fields import choice, derived, layer, param
 from .._types import Colour, Number, Scalar, Vec3
-from ..optics.fresnel import dielectric_f0, fresnel_dielectric, fresnel_schlick
+from ..optics.fresnel import EDGE, dielectric_f0, fresnel_dielectric, fresnel_hoffman, fresnel_schlick
 from ..optics.microfacet import density, half_cosine, half_vector, visibility
 from ..surfaces.base import Surface
 from .dialects import COAT_INDEX, DIALECTS, Dialect
 from .iridescence import filmed_metal, filmed_reflectance, to_rgb
-
-GRAZING = 1.0 / 7.0
-"""Cosine of 82 degrees, where the edge tint of a metal is given (Hoffman 2019)."""
 
 
 def _part(doc: str, default: float | None = None) -> Any:
@@ -137,12 +134,16 @@ class Engine(Surface):
         return jnp.sqrt(width[0] * width[1]) if isinstance(width, tuple) else width
 
     def _metal_reflectance(self, c: Scalar) -> Any:
-        """Schlick 1994, with the dip before grazing angles where there is an edge tint (Hoffman 2019; Kutz et al. 2021, eq. 12)."""
-        F = self._schlick(c, self.base_color)
+        """Schlick 1994, with the dip before grazing angles where there is an edge tint."""
         if self.edge_tint is None:
-            return F
-        dip = fresnel_schlick(jnp.asarray(GRAZING), self.base_color) * (1.0 - self.edge_tint) / (GRAZING * (1.0 - GRAZING) ** 6)
-        return F - dip * c * (1.0 - c) ** 6
+            return self._schlick(c, self.base_color)
+        return fresnel_hoffman(c, self.base_color, self._edge)
+
+    @property
+    def _edge(self) -> Any:
+        """Reflectance of a metal at 82 degrees."""
+        F = fresnel_schlick(jnp.asarray(EDGE), self.base_color)
+        return F if self.edge_tint is None else F * self.edge_tint
 
     @property
     def _index(self) -> Any:
@@ -156,9 +157,7 @@ class Engine(Surface):
         at = wo[2] if self.rules.film == "view" else c
         rgb = (self.film_x, self.film_y, self.film_z)
         if self.rules.film_on == "metal":
-            return filmed_metal(
-                at, self.film_nm, self.film_eta, self.base_color, self._metal_reflectance(jnp.asarray(GRAZING)), rgb
-            )
+            return filmed_metal(at, self.film_nm, self.film_eta, self.base_color, self._edge, rgb)
         return filmed_reflectance(at, self.film_nm, self.film_eta, self.base_color, rgb, self._schlick)
 
     def _schlick(self, c: Scalar, f0: Any) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._chunk import clip, safe_sqrt
 from .._types import Colour, Number, Scalar
-from ..optics.fresnel import dielectric_f0
+from ..optics.fresnel import dielectric_f0, fresnel_hoffman
 
 _PLACE = (1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6)
 _VARIANCE = (4.3278e9, 9.3046e9, 6.6121e9, 4.5282e9)
@@ -64,7 +64,7 @@ def filmed_metal(c: Scalar, film_nm: Number, film_eta: Number, f0: Colour, f82: 
     n = (1.0 + root) / (1.0 - root) * (1.0 - f82) + (1.0 - r) / (1.0 + r) * f82
     k = safe_sqrt((r * (n + 1.0) ** 2 - (n - 1.0) ** 2) / (1.0 - r))
     cosine = safe_sqrt(1.0 - (1.0 - c * c) / (eta * eta))
-    bottom = _between(cosine, ((n - eta) ** 2 + k * k) / ((n + eta) ** 2 + k * k), f82)
+    bottom = clip(fresnel_hoffman(cosine, ((n - eta) ** 2 + k * k) / ((n + eta) ** 2 + k * k), f82), 0.0, 1.0)
     total: Any = 0.0
     for top, phase in zip(_top(c, cosine, eta), _phases(cosine, eta, n, k), strict=True):
         sign = -jnp.sign(top)
@@ -72,12 +72,6 @@ def filmed_metal(c: Scalar, film_nm: Number, film_eta: Number, f0: Colour, f82: 
         phasor = (sign * phase[0], sign * phase[1])
         total = total + 0.5 * _airy(top * top, bottom, both, phasor, 2.0 * eta * film_nm * cosine, 3, rgb)
     return clip(total, 0.0, 1.0)
-
-
-def _between(c: Scalar, f0: Any, f82: Any) -> Any:
-    """Schlick's formula with a reflectance of its own at 82 degrees (Hoffman 2019)."""
-    edge = f0 + (1.0 - f0) * (6.0 / 7.0) ** 5
-    return clip(f0 + (1.0 - f0) * (1.0 - c) ** 5 - (edge - f82) * 7.0 * (7.0 / 6.0) ** 6 * c * (1.0 - c) ** 6, 0.0, 1.0)
 
 
 def _top(c: Scalar, cosine: Any, eta: Any) -> tuple[Any, Any]:

@@ -10,13 +10,13 @@ import numpy as np
 
 from ..forms.corrected import Corrected
 from ..layers import Coat
-from ..optics.fresnel import fresnel_conductor, fresnel_schlick
+from ..optics.fresnel import EDGE, fresnel_conductor, fresnel_schlick
 from ..preset import form_of
 from ..stack import Stack
 from ..surfaces import Conductor, Dielectric, Lambert
 from . import words
 from .dialects import COAT_INDEX, DIALECTS
-from .engine import GRAZING, Engine
+from .engine import Engine
 
 BRIGHT = 0.2
 """Reflectance at normal incidence from which on a lobe beside a diffuse part is a metal's."""
@@ -89,8 +89,8 @@ def _base(stack: Stack, coats: list[Any], dialect: str) -> Engine:
 
 def _edge_tint(metal: Any, f0: np.ndarray) -> np.ndarray:
     """A metal's reflectance at 82 degrees over that of Schlick's formula."""
-    at_edge = _colour(metal.reflectance(jnp.asarray(GRAZING)))
-    return np.clip(at_edge / np.asarray(fresnel_schlick(jnp.asarray(GRAZING), jnp.asarray(f0))), 0.0, 1.0)
+    at_edge = _colour(metal.reflectance(jnp.asarray(EDGE)))
+    return np.clip(at_edge / np.asarray(fresnel_schlick(jnp.asarray(EDGE), jnp.asarray(f0))), 0.0, 1.0)
 
 
 def _widths(base: Any, lobe: Any) -> dict[str, Any]:
@@ -163,8 +163,8 @@ def metal_of(f0: np.ndarray, edge_tint: np.ndarray | None) -> tuple[np.ndarray, 
     share = np.linspace(0.0, 1.0, 257)[:, None]
     eta = least * (most / least) ** share
     k = np.sqrt(np.maximum((r * (eta + 1.0) ** 2 - (eta - 1.0) ** 2) / (1.0 - r), 0.0))
-    schlick = np.asarray(fresnel_schlick(jnp.asarray(GRAZING), jnp.asarray(r)))
+    schlick = np.asarray(fresnel_schlick(jnp.asarray(EDGE), jnp.asarray(r)))
     wanted = schlick if edge_tint is None else schlick * edge_tint
-    found = np.asarray(jax.vmap(lambda n, k: fresnel_conductor(jnp.asarray(GRAZING), n, k))(jnp.asarray(eta), jnp.asarray(k)))
+    found = np.asarray(jax.vmap(lambda n, k: fresnel_conductor(jnp.asarray(EDGE), n, k))(jnp.asarray(eta), jnp.asarray(k)))
     at = np.argmin(np.abs(found - wanted), 0)
     return eta[at, np.arange(3)], k[at, np.arange(3)]

@@ -66,6 +66,16 @@ def fresnel_schlick(c: Scalar, f0: Colour) -> Colour:
     return f0 + (1.0 - f0) * (m2 * m2 * m)
 
 
+EDGE = 1.0 / 7.0
+"""Cosine of 82 degrees, where Schlick's formula is lowest below the reflectance of a metal (Hoffman 2019)."""
+
+
+def fresnel_hoffman(c: Scalar, f0: Colour, f82: Colour) -> Colour:
+    """Schlick's formula with a dip before grazing angles, to the reflectance `f82` at 82 degrees (Hoffman 2019; Kutz et al. 2021, eq. 12)."""
+    dip = fresnel_schlick(jnp.asarray(EDGE), f0) - f82
+    return fresnel_schlick(c, f0) - dip / (EDGE * (1.0 - EDGE) ** 6) * c * (1.0 - c) ** 6
+
+
 @chunk
 def rarer_cosine(c: Scalar, eta: Colour) -> Colour:
     """The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.
