@@ -20,6 +20,7 @@ from layerfit.capture.load import load
 from layerfit.capture.measured.read import read_brdf
 from layerfit.capture.scene_file import read_scene
 from layerfit.errors import InputError, LayerfitError
+from layerfit.interchange.formats import read_start
 from layerfit.maps.kept import read_tile
 from layerfit.preset import read_preset
 from layerfit.study.kept import Kept
@@ -123,6 +124,13 @@ def test_a_document_without_end_is_refused(tmp_path):
     path.write_text('study = { material = "/dev/zero" }\nvary = { "base.alpha" = [0.1] }')
     with pytest.raises(InputError, match="/dev/zero: more than 4194304 bytes are too many"):
         read_plan(path)
+
+
+def test_a_material_without_end_is_refused(tmp_path):
+    path = tmp_path / "start.glb"
+    path.symlink_to("/dev/zero")
+    with pytest.raises(InputError, match=r"start\.glb: more than 67108864 bytes are too many for a material"):
+        read_start(path)
 
 
 MANIFESTS = {

@@ -27,16 +27,24 @@ MAX_BYTES = 4 * 2**20
 """Scene files and presets are a few kB; anything larger is not one."""
 
 
-def read_document(path: Path) -> dict[str, Any]:
-    """A TOML (`.toml`) or JSON file as a table. Raises `InputError` with the place of the fault."""
+def read_bytes(path: Path, most: int, what: str) -> bytes:
+    """The content of a file of at most so many bytes, as `what` has. Raises `InputError`."""
     try:
-        with path.open("rb") as file:  # not by its size, which that of a device does not say
-            content = file.read(MAX_BYTES + 1)
-        if len(content) > MAX_BYTES:
-            raise InputError(f"{path}: more than {MAX_BYTES} bytes are too many for a scene file or a preset")
-        text = content.decode()
+        with path.open("rb") as file:
+            large = os.fstat(file.fileno()).st_size > most  # before memory is taken; of a device it says nothing
+            content = b"" if large else file.read(most + 1)
     except OSError as error:
         raise unreadable(path, error) from None
+    if large or len(content) > most:
+        raise InputError(f"{path}: more than {most} bytes are too many for {what}")
+    return content
+
+
+def read_document(path: Path) -> dict[str, Any]:
+    """A TOML (`.toml`) or JSON file as a table. Raises `InputError` with the place of the fault."""
+    content = read_bytes(path, MAX_BYTES, "a scene file or a preset")
+    try:
+        text = content.decode()
     except UnicodeDecodeError as error:
         what = "an EXR image" if content.startswith(EXR) else f"not UTF-8 text (byte {error.start})"
         raise InputError(

@@ -8,7 +8,7 @@ from typing import Any
 
 from .. import preset as presets
 from .._data import shaders
-from ..documents import MAX_BYTES, nearest, read_document, unreadable, write_text
+from ..documents import MAX_BYTES, nearest, read_bytes, read_document, write_text
 from ..errors import InputError
 from ..preset import SCHEMA as PRESET, preset_of, read_preset
 from ..shipped import find_preset
@@ -49,6 +49,9 @@ FORMATS = {
     "three": Format("three", ".js", web.write_three),
     "babylon": Format("babylon", ".js", web.write_babylon),
 }
+
+MOST_BYTES = 16 * MAX_BYTES
+"""Of a glTF file whose meshes are inside."""
 
 READ = (".gltf", ".glb", ".mtlx", ".json")
 """Endings of what a fit can start from: materials of other programs, and presets."""
@@ -123,7 +126,7 @@ def read_start(path: Path) -> Stack:
     if ending == ".json":
         document = read_document(path)
         return read_preset(path) if document.get("schema") == PRESET else _checked(blender.read(path, document), path)
-    content = _bytes(path)
+    content = read_bytes(path, MOST_BYTES, "a material")
     if ending == ".mtlx":
         return _checked(openpbr.read(path, content.decode("utf-8", errors="replace")), path)
     return _checked(gltf.read(path, content), path)
@@ -141,19 +144,6 @@ def _advice(ending: str) -> str:
     if ending == ".blend":
         return "`layerfit blender-kit` writes a script that renders a reference in Blender and leaves its material beside it"
     return "Export it as one of them"
-
-
-MOST_BYTES = 16 * MAX_BYTES
-"""Of a glTF file whose meshes are inside."""
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError(f"{path}: {path.stat().st_size} bytes are too many for a material; {MOST_BYTES} are read at most")
-        return path.read_bytes()
-    except OSError as error:
-        raise unreadable(path, error) from None
 
 
 def blender_kit() -> str:

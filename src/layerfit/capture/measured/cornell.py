@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...optics.spectra import covers, resampling, rgb_weights
-from .data import MeasuredBrdf, direction, measured, read_bytes
+from .data import MeasuredBrdf, direction, measured, read_file
 
 MOST_WAVELENGTHS = 1000
 LARGEST_ANGLE = 10.0
@@ -21,7 +21,7 @@ KIND = "Cornell"
 
 def read_cornell(path: Path, illuminant: str = "D65") -> MeasuredBrdf:
     """Read such a file; spectra become linear Rec.709 by the CIE 1931 observer under `illuminant`. Raises `InputError`."""
-    text = read_bytes(path).decode("latin-1")
+    text = read_file(path).decode("latin-1")
     wavelengths, rows = _numbers(path, text)
     if not np.all(np.abs(rows[:, :4]) <= LARGEST_ANGLE):
         raise InputError(f"{path}: an angle is not finite or above {LARGEST_ANGLE:g} rad; is the file damaged?")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...documents import unreadable
+from ...documents import read_bytes
 from ...errors import InputError
 
 MOST_BYTES = 2**30
@@ -101,12 +101,6 @@ def half_angle(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
     return np.arctan2(np.hypot(h[:, 0], h[:, 1]), h[:, 2])
 
 
-def read_bytes(path: Path) -> bytes:
+def read_file(path: Path) -> bytes:
     """A file whose size is that of a measurement. Raises `InputError`."""
-    try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise InputError(f"{path}: {size} bytes are too many for a measured BRDF; {MOST_BYTES} are read at most")
-        return path.read_bytes()
-    except OSError as error:
-        raise unreadable(path, error) from None
+    return read_bytes(path, MOST_BYTES, "a measured BRDF")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from .data import MOST_BYTES, MeasuredBrdf, direction, measured, mirrored, read_bytes
+from .data import MOST_BYTES, MeasuredBrdf, direction, measured, mirrored, read_file
 
 SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0
 """BRDF [1/sr] over stored value, a channel each: as in the reader that comes with the data."""
@@ -20,7 +20,7 @@ KIND = "MERL"
 
 def read_merl(path: Path) -> MeasuredBrdf:
     """Read such a table; a sample stands in the middle of each cell. Raises `InputError`."""
-    data = read_bytes(path)
+    data = read_file(path)
     shape = _shape(path, data)
     stored = np.frombuffer(data, "<f8", offset=HEADER).reshape(3, -1).T
     wi, wo = cells(shape)

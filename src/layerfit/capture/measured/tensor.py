@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from .data import read_bytes
+from .data import read_file
 
 MAGIC = b"tensor_file\0"
 VERSION = (1, 0)
@@ -22,7 +22,7 @@ _TYPES = dict(enumerate(("u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "
 
 def read_tensors(path: Path) -> dict[str, np.ndarray]:
     """The arrays of a tensor file by name. Raises `InputError` for one that is cut off or says more than it holds."""
-    data = read_bytes(path)
+    data = read_file(path)
     if not data.startswith(MAGIC):
         raise InputError(f"{path}: is not a tensor file: it does not begin with {MAGIC[:-1].decode()!r}")
     try:
