@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._fields import params
+from ..fit.parameters import known_parameters
 from ..preset import preset_of
 from ..shader.export import print_material
 from ..shader.program import program
@@ -34,16 +34,12 @@ def live(stack: Stack, name: str, fitted: Mapping[str, Mapping[str, Any]] | None
 
 def _parameters(stack: Stack, fitted: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Every number of the material, in the order of its leaves."""
-    rows = []
-    for layer in (*stack.layers, stack.base):
-        for field, spec in params(layer):
-            if (value := getattr(layer, field)) is None:
-                continue
-            name = f"{layer.name}.{field}"
-            row = {key: getattr(spec, key) for key in ("doc", "unit", "lower", "upper", "scale", "soft")}
-            row |= {"name": name, "value": _numbers(value), "fitted": name in fitted}
-            sigma = fitted.get(name, {}).get("sigma")
-            rows.append(row | ({} if sigma is None else {"sigma": sigma if isinstance(sigma, list) else [sigma]}))
+    rows, layers = [], (*stack.layers, stack.base)
+    for name, (k, field, spec) in known_parameters(stack).items():
+        row = {key: getattr(spec, key) for key in ("doc", "unit", "lower", "upper", "scale", "soft")}
+        row |= {"name": name, "value": _numbers(getattr(layers[k], field)), "fitted": name in fitted}
+        sigma = fitted.get(name, {}).get("sigma")
+        rows.append(row | ({} if sigma is None else {"sigma": sigma if isinstance(sigma, list) else [sigma]}))
     assert len(rows) == len(jax.tree.leaves(stack)), "a number of a layer is not one of its parameters"
     return rows
 

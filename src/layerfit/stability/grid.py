@@ -8,8 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from .._fields import params
-from ..fit.parameters import Free
+from ..fit.parameters import Free, known_parameters
 from ..stack import Stack
 
 POLAR_DEG = (0.0, 0.001, 20.0, 45.0, 70.0, 85.0, 89.0, 89.9, 89.99)
@@ -53,10 +52,7 @@ class Grid:
 
 def parameters(stack: Stack) -> tuple[Free, ...]:
     """Every number of a material, in the order of its leaves."""
-    layers = (*stack.layers, stack.base)
-    given = [(k, layer, key, spec) for k, layer in enumerate(layers) for key, spec in params(layer)]
-    there = [(k, layer, key, spec) for k, layer, key, spec in given if getattr(layer, key) is not None]
-    return tuple(Free(f"{layer.name}.{key}", k, key, spec, (slot,)) for slot, (k, layer, key, spec) in enumerate(there))
+    return tuple(Free(name, *told, (slot,)) for slot, (name, told) in enumerate(known_parameters(stack).items()))
 
 
 def grid(stack: Stack, corners: int, seed: int = 0) -> Grid:
