@@ -40,7 +40,7 @@ FORMULAS = {
 def test_what_is_computed_lies_within(name):
     fn = FORMULAS[name]
     closed = jax.make_jaxpr(fn)(jnp.float32(1.0), jnp.float32(1.0))
-    of = known(closed.jaxpr, closed.consts, [WITHIN, WITHIN])
+    of = known(closed.jaxpr, closed.consts, [WITHIN, WITHIN], {})
     low, high = read(of, closed.jaxpr.outvars[0])
     a, b = np.random.default_rng(0).uniform(-2.0, 3.0, (2, 4000)).astype(np.float32)
     values = np.asarray(jax.vmap(fn)(a, b))
@@ -87,7 +87,7 @@ def test_a_value_below_0_is_negated():
 
 def test_what_may_be_anything_settles_nothing():
     closed = jax.make_jaxpr(lambda a: where(jnp.abs(a) > 1.0, jnp.maximum(a, 2.0), safe_sqrt(a)))(1.0)
-    assert not settled(closed.jaxpr, known(closed.jaxpr, closed.consts, [ANY]))
+    assert not settled(closed.jaxpr, known(closed.jaxpr, closed.consts, [ANY], {}))
 
 
 def test_a_material_has_the_guards_that_its_numbers_ask_for():

@@ -26,6 +26,8 @@ class Bounds(NamedTuple):
 
 ANY = Bounds(-np.inf, np.inf)
 Settled = Mapping[Any, Any]
+Calls = dict[tuple[Any, ...], Mapping[Any, Bounds]]
+"""Bounds of the values of a function, by `call`: a function is called in many places, and each is looked at from all that are around it."""
 
 
 def exactly(value: Any) -> Bounds:
@@ -39,13 +41,25 @@ def _together(bounds: Bounds) -> Bounds:
     return Bounds(np.min(bounds.low), np.max(bounds.high))
 
 
-def known(jaxpr: Any, consts: Sequence[Any], given: Sequence[Bounds]) -> dict[Any, Bounds]:
-    """Bounds of every value of a jaxpr, by those of its inputs."""
-    of = dict(zip(jaxpr.constvars, map(exactly, consts), strict=True)) | dict(zip(jaxpr.invars, given, strict=True))
-    with np.errstate(all="ignore"):
-        for eqn in jaxpr.eqns:
-            of.update(zip(eqn.outvars, _results(eqn, [read(of, v) for v in eqn.invars]), strict=True))
-    return of
+def call(jaxpr: Any, consts: Sequence[Any], given: Sequence[Bounds]) -> tuple[Any, ...]:
+    """What calls of one function have in common whose inputs have the same bounds."""
+    return (
+        jaxpr,
+        tuple(map(id, consts)),
+        tuple((np.shape(end), np.asarray(end, float).tobytes()) for ends in given for end in ends),
+    )
+
+
+def known(jaxpr: Any, consts: Sequence[Any], given: Sequence[Bounds], calls: Calls) -> Mapping[Any, Bounds]:
+    """Bounds of every value of a jaxpr, by those of its inputs; looked up where it is one of the `calls` before, else added to them."""
+    key = call(jaxpr, consts, given)
+    if key not in calls:
+        of = dict(zip(jaxpr.constvars, map(exactly, consts), strict=True)) | dict(zip(jaxpr.invars, given, strict=True))
+        with np.errstate(all="ignore"):
+            for eqn in jaxpr.eqns:
+                of.update(zip(eqn.outvars, _results(eqn, [read(of, v) for v in eqn.invars], calls), strict=True))
+        calls[key] = of
+    return calls[key]
 
 
 def read(of: Mapping[Any, Bounds], var: Any) -> Bounds:
@@ -73,7 +87,7 @@ def inner_of(eqn: Any) -> tuple[Any, Sequence[Any]] | None:
     return called and (called.jaxpr, called.consts)
 
 
-def _results(eqn: Any, given: list[Bounds]) -> list[Bounds]:
+def _results(eqn: Any, given: list[Bounds], calls: Calls) -> list[Bounds]:
     name = eqn.params.get("name") if eqn.primitive.name in ("jit", "pjit") else eqn.primitive.name
     if name == "above":  # used only where the direction's cosine, its last number, is above 0
         low, high = (np.broadcast_to(end, eqn.outvars[0].aval.shape).copy() for end in given[-1])
@@ -86,7 +100,7 @@ def _results(eqn: Any, given: list[Bounds]) -> list[Bounds]:
         return [_sum(_product(a, b, left is right), left.aval.shape[0])]
     if inner := inner_of(eqn):
         jaxpr, consts = inner
-        of = known(jaxpr, consts, given)
+        of = known(jaxpr, consts, given, calls)
         return [read(of, v) for v in jaxpr.outvars]
     rule = _RULES.get(eqn.primitive.name)
     if rule is None:

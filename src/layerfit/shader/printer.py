@@ -14,11 +14,14 @@ import jax
 import numpy as np
 from jax.extend.core import Literal
 
-from .bounds import ANY, Bounds, exactly, known, read, resolved, settled
+from .bounds import ANY, Bounds, Calls, call, exactly, known, read, resolved, settled
 from .glsl import ATOM, PREFIX, UNARY, PrintError, StructType, Value, glsl_type, indent, lift, literal, reads, safe
 from .names import name_of, source_of
 from .primitives import BUILTINS, GUARDS, PRIMITIVES
 from .structs import comment_lines, comment_of, grouped, leaves_of, result_paths, struct_text, struct_value
+
+Parameter = tuple[str, str, StructType | None]
+"""Of a chunk: its name, its type, and the struct that it is."""
 
 
 class Printer:
@@ -30,6 +33,8 @@ class Printer:
         self.structs: dict[tuple[Any, ...], StructType] = {}
         self.helpers: dict[str, str] = {}
         self.arrays: dict[str, str] = {}
+        self.calls: Calls = {}
+        self.printed: dict[tuple[Any, ...], tuple[str, list[Parameter], StructType | None]] = {}
 
     def structs_text(self) -> str:
         """Declarations of the structs."""
@@ -115,13 +120,17 @@ class Printer:
         text = f"{doc}{kind} {name}({', '.join(declared)}) {{\n{indent(body.text(lift(result, kind)))}}}\n"
         self.functions[name] = (name, text)
 
-    def chunk(
-        self, name: str, closed: Any, bounds: Sequence[Bounds]
-    ) -> tuple[str, list[tuple[str, str, StructType | None]], StructType | None]:
-        """Print a chunk once; returns its GLSL name, its parameters as (name, type, struct) and the struct that it returns.
+    def chunk(self, name: str, closed: Any, bounds: Sequence[Bounds]) -> tuple[str, list[Parameter], StructType | None]:
+        """Print a chunk once; returns its GLSL name, its parameters and the struct that it returns.
 
         `bounds` are what its arguments can be, here: where they make another text of it, that is a function of its own.
         """
+        key = name, *call(closed.jaxpr, closed.consts, bounds)
+        if key not in self.printed:
+            self.printed[key] = self._chunk(name, closed, bounds)
+        return self.printed[key]
+
+    def _chunk(self, name: str, closed: Any, bounds: Sequence[Bounds]) -> tuple[str, list[Parameter], StructType | None]:
         jaxpr, fn = closed.jaxpr, self.chunks[name]
         info = jaxpr.debug_info
         notes = inspect.get_annotations(fn)
@@ -166,7 +175,7 @@ class _Frame:
 
     def __init__(self, printer: Printer, jaxpr: Any, consts: Sequence[Any], bounds: Sequence[Bounds]):
         self.values: dict[Any, Value] = {}
-        self.bounds = known(jaxpr, consts, bounds)
+        self.bounds = known(jaxpr, consts, bounds, printer.calls)
         self.same = settled(jaxpr, self.bounds)
         self.left: dict[Any, int] = {}
         self.named_by = {kept: eqn for eqn in jaxpr.eqns if not isinstance(kept := self.same.get(eqn.outvars[0]), Literal)}
