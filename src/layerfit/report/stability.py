@@ -2,7 +2,7 @@
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,57 +79,49 @@ def _panel(
         draw.text(spot, f"{polar_deg[column]:g}", fill=INK, font=font, anchor="mm")
 
 
-_HEADINGS = (
-    "structure",
-    "combinations",
-    "not finite",
-    "float32: value p99.9",
-    "max",
-    "beyond",
-    "50 digits: value",
-    "slope",
-    "beyond",
-    "float64: value",
-    "slope",
-    "beyond",
-    "shader max",
-    "compact",
-    "tables",
-    "breaks",
-)
+def _found(key: str, *what: str) -> Callable[[Mapping[str, Any]], str]:
+    """Of the cases in 50 digits: how many are beyond a tolerance, or the largest error."""
+
+    def cell(entry: Mapping[str, Any]) -> str:
+        if entry["digits"] is None:
+            return "-"
+        found = entry["digits"][key]
+        return str(sum(found[name] for name in what)) if what == _BEYOND else _short(found[what[0]])
+
+    return cell
 
 
-def _cells(entry: Mapping[str, Any]) -> tuple[str, ...]:
-    shader = entry["shader"]
-    broken = ", ".join(f"{told['kind']}: {told['parameter']}" for told in entry["breaks"]) or "-"
-    value = entry["value_rel"]
-    digits = [cell for key in ("float32", "float64") for cell in _digits(entry["digits"], key)]
-    return (
-        entry["name"],
-        str(entry["combinations"]),
-        str(entry["not_finite"]),
-        _short(value["p999"]),
-        _short(value["max"]),
-        str(entry["beyond"]),
-        *digits,
-        "-" if shader is None else _short(shader["max_rel"]),
-        *("-" if entry[tier] is None else _short(entry[tier]["value_max"]) for tier in ("compact", "tables")),
-        broken,
-    )
+def _of(part: str, key: str) -> Callable[[Mapping[str, Any]], str]:
+    return lambda entry: "-" if entry[part] is None else _short(entry[part][key])
 
 
-def _digits(digits: Mapping[str, Any] | None, key: str) -> tuple[str, str, str]:
-    if digits is None:
-        return "-", "-", "-"
-    found = digits[key]
-    return _short(found["value_max"]), _short(found["slope_max"]), f"{found['value_beyond'] + found['slope_beyond']}"
+def _breaks(entry: Mapping[str, Any]) -> str:
+    return ", ".join(f"{told['kind']}: {told['parameter']}" for told in entry["breaks"]) or "-"
 
 
 def _short(value: float | None) -> str:
     return "infinite" if value is None else f"{value:.1e}"
 
 
-_TERMINAL = {5: "float32 off", 8: "off from 50 digits", 11: "float64 off"}
+_COLUMNS: tuple[tuple[str, str | None, Callable[[Mapping[str, Any]], str]], ...] = (
+    ("structure", "structure", lambda entry: entry["name"]),
+    ("combinations", None, lambda entry: str(entry["combinations"])),
+    ("not finite", "not finite", lambda entry: str(entry["not_finite"])),
+    ("float32: value p99.9", None, _of("value_rel", "p999")),
+    ("max", None, _of("value_rel", "max")),
+    ("beyond", "float32 off", lambda entry: str(entry["beyond"])),
+    ("50 digits: value", None, _found("float32", "value_max")),
+    ("slope", None, _found("float32", "slope_max")),
+    ("beyond", "off from 50 digits", _found("float32", *_BEYOND)),
+    ("float64: value", None, _found("float64", "value_max")),
+    ("slope", None, _found("float64", "slope_max")),
+    ("beyond", "float64 off", _found("float64", *_BEYOND)),
+    ("shader max", None, _of("shader", "max_rel")),
+    ("compact", None, _of("compact", "value_max")),
+    ("tables", None, _of("tables", "value_max")),
+    ("breaks", "breaks", _breaks),
+)
+"""Of the tables: what each is called in the manual and in the terminal, which has not all of them, and what it says of a structure."""
 
 
 def table(document: Mapping[str, Any]) -> "Group":
@@ -139,13 +131,12 @@ def table(document: Mapping[str, Any]) -> "Group":
     from rich.text import Text
 
     made = Table(header_style="dim", box=None, pad_edge=False)
-    chosen = [0, 2, 5, 8, 11, 15]
-    for k in chosen:
-        made.add_column(_TERMINAL.get(k, _HEADINGS[k]), justify="left" if k in (0, 15) else "right")
+    shown = [(name, cell) for _, name, cell in _COLUMNS if name]
+    for name, _ in shown:
+        made.add_column(name, justify="left" if name in ("structure", "breaks") else "right")
     for entry in document["structures"]:
         if not entry["good"]:
-            cells = _cells(entry)
-            made.add_row(*(cells[k] for k in chosen))
+            made.add_row(*(cell(entry) for _, cell in shown))
     return Group(*([made] if made.rows else []), Text(sentence(document)))
 
 
@@ -160,9 +151,9 @@ def sentence(document: Mapping[str, Any]) -> str:
 
 def markdown(document: Mapping[str, Any]) -> str:
     """The whole sweep as tables for the manual."""
-    lines = [sentence(document), "", *_row(_HEADINGS), *_row(["---"] * len(_HEADINGS))]
+    lines = [sentence(document), "", *_row([heading for heading, _, _ in _COLUMNS]), *_row(["---"] * len(_COLUMNS))]
     for entry in document["structures"]:
-        lines += _row(_cells(entry))
+        lines += _row([cell(entry) for _, _, cell in _COLUMNS])
     lines += ["", "The largest errors of a value, one a structure and material:", "", *_cases(document["worst"])]
     return "\n".join(lines) + "\n"
 
