@@ -3,14 +3,14 @@
 `tools/fuzz.py` makes them by the ten thousand; here are a few of each kind, and all that were once neither read nor refused.
 """
 
-import importlib.util
 import json
 import struct
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
+from fuzz import made
+from fuzz_files import ANEW, KINDS, corpus
 
 from commands import SCENE, TRUTH
 from layerfit.batch import fit_batch
@@ -27,12 +27,6 @@ from layerfit.study.kept import Kept
 from layerfit.study.sweep import read_plan
 from measured_files import write_cornell, write_rgl, write_tensors
 
-spec = importlib.util.spec_from_file_location("fuzz", Path(__file__).parents[1] / "tools" / "fuzz.py")
-assert spec is not None
-assert spec.loader is not None
-fuzz = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(fuzz)
-
 EACH = 40
 
 
@@ -45,18 +39,18 @@ def refusal(read, path):
     return None
 
 
-@pytest.mark.parametrize("kind", fuzz.KINDS)
+@pytest.mark.parametrize("kind", KINDS)
 def test_mutated_files_are_read_or_refused(kind, tmp_path):
-    whole = fuzz.corpus(kind, tmp_path)
-    suffix, read = fuzz.KINDS[kind]
+    whole = corpus(kind, tmp_path)
+    suffix, read = KINDS[kind]
     path = tmp_path / f"mutated{suffix}"
     refused = 0
     for number in range(EACH):
-        path.write_bytes(fuzz.made(kind, number, whole))
+        path.write_bytes(made(kind, number, whole))
         said = refusal(read, path)
         refused += said is not None
         assert said is None or str(path) in said
-    assert refused == 0 if kind in fuzz.ANEW else refused > EACH // 8, "the mutations reach the readers"
+    assert refused == 0 if kind in ANEW else refused > EACH // 8, "the mutations reach the readers"
     for data in whole:
         path.write_bytes(data)
         read(path)
@@ -155,13 +149,13 @@ def test_a_manifest_that_was_made_to_break(name, tmp_path):
 def test_channels_whose_numbers_are_none(layer, number, tmp_path):
     """What is no number is left out and counted, and nothing overflows."""
     path = tmp_path / "whole.exr"
-    (data,) = fuzz.corpus("views", tmp_path)
+    (data,) = corpus("views", tmp_path)
     path.write_bytes(data)
     channels = {name: np.array(a) for name, a in read_exr(path).channels.items()}
     channels[layer][3, 3:5] = number
     write_exr(path, channels)
     with warnings.catch_warnings(action="error"):
-        fuzz.KINDS["views"][1](path)
+        KINDS["views"][1](path)
         (view,) = load(read_scene(tmp_path / "views.toml"))
     lost = {"N.X": 2, "P.Y": 2, "T.Z": 2, "uv.U": 2, "SE.G": 0}[layer]
     if layer == "N.X" and not np.isfinite(number):
@@ -199,7 +193,7 @@ def test_parts_that_are_none_are_made_again(content, tmp_path):
 
 def test_a_tile_that_was_spoilt_is_none(tmp_path):
     path = tmp_path / "one.tile"
-    (whole,) = fuzz.corpus("tile", tmp_path)
+    (whole,) = corpus("tile", tmp_path)
     path.write_bytes(whole)
     found = read_tile(path)
     assert found is not None
@@ -218,7 +212,7 @@ def test_a_message_is_never_longer_than_a_page():
 
 def test_a_small_picture_that_claims_to_be_huge_is_refused_at_once(tmp_path):
     path = tmp_path / "huge.exr"
-    data = bytearray(fuzz.corpus("exr", tmp_path)[1])
+    data = bytearray(corpus("exr", tmp_path)[1])
     for name in (b"dataWindow\0box2i\0", b"displayWindow\0box2i\0"):
         at = data.index(name) + len(name) + 4
         data[at : at + 16] = struct.pack("<4i", 0, 0, 99_999, 99_999)
