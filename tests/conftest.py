@@ -21,7 +21,7 @@ from layerfit._compiled import OPTIONS, fusion_emitters
 if TYPE_CHECKING:
     import moderngl
 
-# Tests compile much and compute little: all is compiled quickly rather than well, but for modules marked `optimised`.
+# Tests compile much and compute little: all is compiled quickly rather than well, but for what is marked `optimised`.
 # In one piece: what is cut up for threads takes a fifth more of the processor, and the tests have a process on each core.
 _FLAGS = ["--xla_backend_optimization_level=0", "--xla_disable_hlo_passes=call-inliner", XLA_FLAGS]
 _FLAGS += ["--xla_cpu_parallel_codegen_split_count=1"]
@@ -29,7 +29,6 @@ _FLAGS += [f"--{name}=false" for name in fusion_emitters(newer=False)]
 os.environ.setdefault("XLA_FLAGS", " ".join(_FLAGS))
 _LEVEL = "xla_backend_optimization_level"
 _OPTIMISED = OPTIONS[_LEVEL]
-OPTIONS[_LEVEL] = 0
 
 # What is compiled for one test is read by all others of the run: those of another worker, and programs that tests start. The folder is made by
 # the process that starts the workers, and is theirs too.
@@ -59,13 +58,11 @@ MOST_MEMORY = 4.0e9
 """Bytes in memory above which what JAX keeps compiled is thrown away: a whole run would keep 6 GB."""
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _optimised(request: pytest.FixtureRequest) -> Iterator[None]:
-    """What computes much, as some fits and the walk do, is compiled as its users have it. So is all that runs in a program of its own."""
-    with pytest.MonkeyPatch.context() as patch:
-        if request.node.get_closest_marker("optimised"):
-            patch.setitem(OPTIONS, _LEVEL, _OPTIMISED)
-        yield
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> None:
+    """What computes much, as some fits and the walk do, is compiled as its users have it, for the fixtures too. So is all that runs in a
+    program of its own."""
+    OPTIONS[_LEVEL] = _OPTIMISED if item.get_closest_marker("optimised") else 0
 
 
 @pytest.fixture(autouse=True)

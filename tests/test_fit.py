@@ -198,6 +198,7 @@ def test_a_series_of_thicknesses_is_fitted_together(see):
     np.testing.assert_allclose(values(result)["coat.eta"], 1.5, rtol=2e-3)
 
 
+@pytest.mark.optimised
 def test_light_from_everywhere_is_fitted_through_its_quadrature(see):
     result = fit([see(lights=(Constant((1.0, 1.0, 1.0)), SUN))], START, starts=2)
     np.testing.assert_allclose(values(result)["coat.tau"], [0.08, 0.25, 0.7], atol=0.02)
