@@ -144,6 +144,12 @@ def rows():
     return hemisphere(256, 1), hemisphere(256, 2), Place(uv, sky=np.linspace(0.0, 1.0, 256))
 
 
+@pytest.mark.parametrize("mixing", ["medium", "added"])
+def test_without_g_light_is_scattered_to_all_sides_alike(mixing, rows):
+    even, given = (Stack((Patina(softness=0.1, albedo=0.5, depth=0.8, g=g, mixing=mixing),), METAL) for g in (None, 0.0))
+    np.testing.assert_allclose(brdf(even, *rows), brdf(given, *rows), rtol=1e-5)
+
+
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_a_patina_has_its_digits(oracle, dtype):
     for case in cases(oracle)["patina_brdf"]:

@@ -26,6 +26,7 @@ from ..surfaces import Conductor
 from . import corrected, faithful
 from .enclosure import haze_below
 from .growth import MEAN_SKY, Cover, Growth, aged_at, cover_at, field_at, growth_of, mean_cover
+from .haze import EVENLY
 
 FORMS = {corrected.Corrected: corrected, faithful.Faithful: faithful}
 """What the film can be computed in."""
@@ -173,10 +174,10 @@ def _scattered(crust: Crust, eta: Scalar, thickness: Scalar, wi: Direction, wo: 
 
 
 @chunk
-def scattered_once(wi: Direction, wo: Direction, eta: Scalar, albedo: Colour, depth: Scalar, g: Scalar) -> Colour:
-    """BRDF [1/sr] of light that is scattered once below a smooth boundary (Hanrahan and Krueger 1993)."""
+def scattered_once(wi: Direction, wo: Direction, eta: Scalar, albedo: Colour, depth: Scalar, g: Scalar | None) -> Colour:
+    """BRDF [1/sr] of light that is scattered once below a smooth boundary (Hanrahan and Krueger 1993); without g the same to all sides."""
     T = transmittance_dielectric(wi[-1], eta) * transmittance_dielectric(wo[-1], eta)
     wi = refract_about_normal(wi, eta)
     wo = refract_about_normal(wo, eta)
-    phase = henyey_greenstein(1.0 + dot(wi, wo), g)
+    phase = EVENLY if g is None else henyey_greenstein(1.0 + dot(wi, wo), g)
     return T / (eta * eta) * scattered_back(phase, albedo, depth, wi[-1], wo[-1])

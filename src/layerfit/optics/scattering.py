@@ -9,7 +9,7 @@ import math
 import jax.numpy as jnp
 
 from .._chunk import chunk, member, safe_divide, safe_sqrt, struct, where
-from .._types import Colour, Scalar
+from .._types import Colour, Number, Scalar
 
 _GRAZING = 1e-8
 """No cosine is taken to be smaller: its reciprocal is the length of a path."""
@@ -77,7 +77,7 @@ def henyey_greenstein(deflection: Scalar, g: Scalar) -> Scalar:
 
 
 @chunk
-def scattered_back(phase: Scalar, albedo: Colour, tau: Colour, cos_i: Scalar, cos_o: Scalar) -> Colour:
+def scattered_back(phase: Number, albedo: Colour, tau: Colour, cos_i: Scalar, cos_o: Scalar) -> Colour:
     """BRDF [1/sr] of light that a slab scatters once, and back, without a boundary (Hanrahan and Krueger 1993)."""
     return once_back(phase, albedo * tau, tau, 1.0 / jnp.maximum(cos_i, _GRAZING), 1.0 / jnp.maximum(cos_o, _GRAZING))
 
