@@ -49,9 +49,14 @@ def module(name: str) -> str:
     return "\n".join([f"const STYLE = {json.dumps(text('page.css'))};", shared(), *map(text, (*VIEWER, name))])
 
 
+def stage(name: str, target: str) -> str:
+    """A stage of a picture for a target of shaders."""
+    return f"{HEADERS[target]}\n{text(name)}"
+
+
 def shared() -> str:
     """What windows draw with too, as a script: the stages of a picture as `GLSL`, by their files, and its lights as `STUDIO`."""
-    stages = {name: f"{HEADERS['essl300']}\n{text(name)}" for name in STAGES}
+    stages = {name: stage(name, "essl300") for name in STAGES}
     return f"const GLSL = {json.dumps(stages)};\nconst STUDIO = {json.dumps(json.loads(text('studio.json')))};"
 
 

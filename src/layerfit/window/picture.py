@@ -13,12 +13,14 @@ import numpy as np
 
 from ..capture.geometry import normalise
 from ..report import pages
-from ..shader.export import HEADERS, Shader
+from ..shader.export import Shader
 from .shapes import mesh
 
 PASSES = 768
 LIGHTS = 4
 """In one pass: the key light, and a point of each soft box."""
+ROBERTS = ((0.7548776662, 0.37), (0.5698402910, 0.61))
+"""Of both coordinates: the step from pass to pass, and how many passes apart the lights are."""
 HALF_FOV = math.radians(13.0)
 SLOW_S = 0.1
 """A pass that takes longer keeps the hand waiting: it is drawn in fewer pixels."""
@@ -36,10 +38,8 @@ def lights(k: int, yaw: float, pitch: float) -> tuple[np.ndarray, np.ndarray]:
     """Places (4, 4) and irradiances (4, 3) of pass k: a point of the key light and of each soft box, by a sequence that fills a square
     evenly (Roberts 2018)."""
 
-    def at(n: int) -> tuple[float, float]:
-        return 2.0 * ((0.5 + 0.7548776662 * (k + 0.37 * n)) % 1.0) - 1.0, 2.0 * (
-            (0.5 + 0.5698402910 * (k + 0.61 * n)) % 1.0
-        ) - 1.0
+    def at(n: int) -> list[float]:
+        return [2.0 * ((0.5 + step * (k + apart * n)) % 1.0) - 1.0 for step, apart in ROBERTS]
 
     key = toward(yaw, pitch)
     a, b = at(0)
@@ -96,9 +96,8 @@ class Picture:
 
     def __init__(self, ctx: Any, shader: Shader):
         self.ctx = ctx
-        header = HEADERS["glsl330"]
-        stage = lambda name: f"{header}\n{pages.text(name)}"  # noqa: E731
-        fragment = shader.text().replace(header, f"{header}\n#define LF_LIGHTS {LIGHTS}", 1)
+        stage = lambda name: pages.stage(name, "glsl330")  # noqa: E731
+        fragment = shader.text("glsl330").replace("\n", f"\n#define LF_LIGHTS {LIGHTS}\n", 1)
         self.material = ctx.program(vertex_shader=stage("mesh.vert"), fragment_shader=fragment)
         self.shown = ctx.program(vertex_shader=stage("screen.vert"), fragment_shader=stage("show.frag"))
         self.added = ctx.program(vertex_shader=stage("screen.vert"), fragment_shader=stage("add.frag"))

@@ -51,8 +51,8 @@ class Screen:
         self.window = _opened(f"{name} - layerfit")
         self.ctx = self.window.ctx
         self.picture = Picture(self.ctx, print_material(stack, name, "prepared"))
-        vertex, fragment = (f"{HEADERS['glsl330']}\n{text}" for text in (pages.text("screen.vert"), TEXTURE))
-        self.paste = self.ctx.program(vertex_shader=vertex, fragment_shader=fragment)
+        fragment = f"{HEADERS['glsl330']}\n{TEXTURE}"
+        self.paste = self.ctx.program(vertex_shader=pages.stage("screen.vert", "glsl330"), fragment_shader=fragment)
         self.nothing = self.ctx.vertex_array(self.paste, [])
         self.sun = self._texture(_disc(round(2 * SUN * self.window.pixel_ratio)))
         self.sliders = None
