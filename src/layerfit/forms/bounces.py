@@ -113,8 +113,10 @@ def _exits(nodes: Nodes, cells: Float[Array, " k"], eta: Scalar) -> Float[Array,
 
     They hide the more, the lower light grazes, as 1 / z; and in all as much as makes out of diffuse light come what comes in, over eta^2.
     """
-    lost = 1.0 - diffuse_return(nodes, None) - hemispherical(nodes.T) / (eta * eta)
-    return jnp.maximum(1.0 - nodes.R - 0.5 * lost / cells, 0.0)
+    comes, not_reflected = hemispherical(nodes.T) / (eta * eta), 1.0 - diffuse_return(nodes, None)
+    if nodes.turn is None:  # several interfaces: what is absorbed between them is lost at all angles alike
+        return (1.0 - nodes.R) * (comes / not_reflected)
+    return jnp.maximum(1.0 - nodes.R - 0.5 * (not_reflected - comes) / cells, 0.0)
 
 
 def _factors(

@@ -97,7 +97,7 @@ class _Top:
     def turns(self, s: Float[Array, " m"]) -> Float[Array, " m"]:
         """Sine below over that at a smooth boundary, beyond 1, for light that the curves' argument s belongs to."""
         assert self.nodes.turn is not None
-        low, high = jnp.split(polynomial(jnp.asarray(self.nodes.turn)), 2)
+        low, high = parts(polynomial(jnp.asarray(self.nodes.turn)))
         return jnp.minimum(jax.vmap(lambda s: curve(low, high, s))(s), self.eta - 1.0)
 
     def reflects(self, z: Float[Array, " k"]) -> Float[Array, " k"]:
