@@ -147,6 +147,7 @@ DOMAINS: dict[Any, dict[str, Any]] = {
         "fresnel_dielectric": (fresnel.fresnel_dielectric, (UNIT, ETA), FULL),
         "transmittance_dielectric": (fresnel.transmittance_dielectric, (UNIT, ETA), FULL),
         "fresnel_conductor": (fresnel.fresnel_conductor, (UNIT, INDEX, K), FULL),
+        "fresnel_hoffman": (fresnel.fresnel_hoffman, (UNIT, UNIT, UNIT), (-1.0, 2.0)),
         "fresnel_schlick": (fresnel.fresnel_schlick, (UNIT, UNIT), FULL),
         "rarer_cosine": (fresnel.rarer_cosine, (UNIT, ETA), FULL),
         "dielectric_f0": (fresnel.dielectric_f0, (ETA,), FULL),

@@ -117,7 +117,7 @@ INSTRUCTIONS = {
     "corrected, anisotropic": 386,
     "corrected, three layers": 574,
     "precise over lambert": 213,
-    "precise over conductor": 453,
+    "precise over conductor": 452,
     "faithful over conductor": 160,
     "flakes": 283,
     "corrected over flakes": 779,

@@ -91,8 +91,8 @@ const Interface lf_coat_both = Interface(
     0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.035054997, 0.020641431, 0.025624495, -0.0064411927),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0061165085, -0.00076546334),                          // passed_high: the other two, of higher powers
-    vec4(0.4084071, 0.058477, -0.027564928, -0.024196982),        // bend: part by which the sine of light becomes smaller below
-    vec2(0.004704416, 0.0075178742),                              // bend_high: 
+    vec4(0.39746922, 0.057255983, -0.027260408, 0.002767682),     // bend: part by which the sine of light becomes smaller below
+    vec2(0.0068576634, -0.00264287),                              // bend_high: 
     vec4(0.09954319, -0.03336258, 0.012172839, -0.000896357),     // spread: width of a lobe seen through it, over that of the facets
     vec2(-0.011329744, -0.0025816858),                            // spread_high: 
     vec4(1.0546787, -0.07149202, 0.017656773, 0.017326474),       // path: mean path over that of the refracted direction
@@ -135,21 +135,21 @@ const Conductor lf_base = Conductor(
 );
 
 const Curve lf_coat_again = Curve(
-    vec3(0.34190425, 0.44525877, 0.3117587),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0076829195, -0.014326312, -0.03012291),  // c1: 
-    vec3(0.022623107, 0.021969259, 0.021054395),     // c2: 
-    vec3(-0.008443922, -0.044234097, 0.014635891),   // c3: 
-    vec3(-0.04978493, -0.062267765, -0.060303077),   // c4: 
-    vec3(-0.021756023, -0.008505821, -0.052791387)   // c5: 
+    vec3(0.3433084, 0.44900802, 0.3121879),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.007885136, -0.019462474, -0.026199639),  // c1: 
+    vec3(0.025252238, 0.026830286, 0.019494131),     // c2: 
+    vec3(0.008871883, -0.005285442, 0.01586482),     // c3: 
+    vec3(-0.052790955, -0.065843314, -0.054506034),  // c4: 
+    vec3(-0.03575173, -0.036551833, -0.049341172)    // c5: 
 );
 
 const Curve lf_coat_rest = Curve(
-    vec3(0.5050539, 0.4054654, 0.29577416),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.013735659, -0.018116161, -0.026982486),  // c1: 
-    vec3(0.044115603, 0.01823616, 0.009027667),      // c2: 
-    vec3(0.034742534, -0.0028259456, 0.011534154),   // c3: 
-    vec3(-0.07766682, -0.042704776, -0.034259334),   // c4: 
-    vec3(-0.07025343, -0.026753694, -0.035301536)    // c5: 
+    vec3(0.47580677, 0.37167528, 0.24029642),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.013003267, -0.016849011, -0.022144146),  // c1: 
+    vec3(0.04136759, 0.015886098, 0.0069574267),     // c2: 
+    vec3(0.032524765, -0.0036182702, 0.009152859),   // c3: 
+    vec3(-0.072990045, -0.038214356, -0.02734989),   // c4: 
+    vec3(-0.0659883, -0.0233365, -0.028268576)       // c5: 
 );
 
 // The cosine between either direction and their half vector.
