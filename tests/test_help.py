@@ -1,9 +1,10 @@
-"""What `--help` says: short enough to be read, and examples that run as they stand."""
+"""What `--help` says: short enough to be read, and examples that run as they stand, as do the commands of README and docs."""
 
 import re
 import shlex
 import shutil
 
+import numpy as np
 import pytest
 import typer.main
 from interrupts import PLAN, write_panel
@@ -12,13 +13,29 @@ from commands import layerfit, process, write_reference
 from layerfit.cli import app
 from layerfit.preset import read_preset
 from layerfit.render import brdf_values
-from measured_files import write_rgl
+from measured_files import write_cornell, write_rgl
 from test_cli import COMMANDS
+from test_docs import blocks, commands
 
 pytestmark = pytest.mark.optimised
 
 KNOWN = typer.main.get_command(app).commands  # pyright: ignore
-EXAMPLES = [line for name in COMMANDS for line in re.findall(r"^  (layerfit .*)$", KNOWN[name].help, re.MULTILINE)]
+HELP = [line for name in COMMANDS for line in re.findall(r"^  (layerfit .*)$", KNOWN[name].help, re.MULTILINE)]
+PAGES = [
+    shlex.join(words) for block in blocks("console", "sh") for words in commands(block.values[0]) if words[0] == "layerfit"
+]
+
+
+def kind(example: str) -> tuple[str, ...]:
+    """The command, the kind of file that it takes, and its options: of those that differ in names and numbers alone one is run."""
+    _, command, *words = shlex.split(example)
+    endings = [word.rpartition(".")[2] for word in words[:2] if "." in word]
+    return command, *endings, *sorted(word for word in words if word.startswith("-"))
+
+
+LONG = ("stability", "tradeoff")
+"""Of these the examples of the help alone are run."""
+EXAMPLES = list({kind(e): e for e in [*PAGES, *HELP] if e in HELP or e.split()[1] not in LONG}.values())
 
 LESS = {
     "fit": ["--starts", "1"],
@@ -33,22 +50,40 @@ LESS = {
 SLOW = ("fit", "structures", "batch", "advise", "truth", "tradeoff", "specialise", "demo")
 
 
+MATERIAL = """\
+[material]
+layers = [{ type = "coat", alpha = 0.3, eta = 1.4, tau = [0.3, 0.3, 0.3] }]
+[material.base]
+type = "conductor"
+alpha = 0.4
+eta = [0.201, 0.924, 1.102]
+k = [3.913, 2.453, 2.142]
+[fit]
+free = ["coat.alpha", "base.alpha"]
+"""
+"""Where a fit of a measurement starts."""
+
+
 @pytest.fixture(scope="module")
 def workplace(tmp_path_factory):
-    """Every file that an example names; in place of the references that ship, a small one."""
+    """Every file that an example names; in place of the references that ship, and of what others measured, small ones."""
     folder = tmp_path_factory.mktemp("workplace")
     shipped = folder / "examples" / "references"
     shipped.mkdir(parents=True)
     scene = write_reference(shipped)
-    for name in ("lacquered_copper", "varnished_wood"):
+    for name in ("lacquered_copper", "varnished_wood", "brushed_steel"):
         shutil.copy(scene, shipped / f"{name}.toml")
     scene.unlink()
     shutil.copytree(shipped, folder / "captures")
-    shutil.copy(shipped / "lacquered_copper.toml", folder / "scene.toml")
+    scene = (shipped / "lacquered_copper.toml").read_text()
+    every_start_has = 'free = ["coat.alpha", "coat.eta", "base.alpha"]'
+    (folder / "scene.toml").write_text(re.sub("free = .*", every_start_has, scene))
     for name in ("reference.exr", "render.exr"):
         shutil.copy(shipped / "reference.exr", folder / name)
-    (folder / "out").mkdir()
-    shutil.copy(shipped / "truth.json", folder / "out" / "preset.json")
+    (folder / "out" / "copper").mkdir(parents=True)
+    for preset in ("out/preset.json", "out/copper/preset.json"):
+        shutil.copy(shipped / "truth.json", folder / preset)
+    assert layerfit("export", shipped / "truth.json", "--to", "gltf", "-o", folder / "copper.gltf").code == 0
     (folder / "directions.csv").write_text("wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n0,0,1,0,0,1\n")
     (folder / "depth.toml").write_text(PLAN)
     write_panel(folder, side=8)
@@ -56,7 +91,11 @@ def workplace(tmp_path_factory):
     coat = 'layers = [{ type = "coat", eta = 1.5, alpha = 0.1, absorption_per_mm = 20, thickness_um = 30 }]'
     panel.write_text(panel.read_text().replace("[material]", f"[material]\n{coat}"))
     stack = read_preset(shipped / "truth.json")
-    write_rgl(folder / "paint.bsdf", lambda wi, wo: brdf_values(stack, wi, wo))
+    for measured in ("paint", "paper_white_rgb", "cg_sunflower_rgb"):
+        write_rgl(folder / f"{measured}.bsdf", lambda wi, wo: brdf_values(stack, wi, wo))
+    for measured in ("krylon_blue", "cayman"):
+        write_cornell(folder / f"{measured}.brdf", lambda wi, wo, nm: brdf_values(stack, wi, wo)[:, :1] * np.ones_like(nm))
+    (folder / "paint.toml").write_text(f'[reference]\nbrdf = "paint.bsdf"\n{MATERIAL}')
     return folder
 
 
@@ -74,7 +113,7 @@ def test_an_example_runs(example, workplace, gl, tmp_path, monkeypatch):
 
 
 def test_every_command_has_an_example():
-    assert {example.split()[1] for example in EXAMPLES} == set(COMMANDS)
+    assert {example.split()[1] for example in HELP} == set(COMMANDS)
 
 
 def said(*words, columns):
