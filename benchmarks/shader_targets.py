@@ -8,22 +8,19 @@ Phong and all shaders take turns in one process.
 
 import argparse
 
+from hand_written import COAT, COPPER
+
 from layerfit.errors import InputError
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
-from layerfit.layers import Coat
 from layerfit.shader.cost import ROUNDS, instructions, times
 from layerfit.shader.export import print_material
 from layerfit.stack import Stack
-from layerfit.surfaces import Conductor, Lambert
+from layerfit.surfaces import Lambert
 from layerfit.tiers.tier import make_tier
 
-COAT = Coat(alpha=0.1, eta=1.5, tau=[0.05, 0.2, 0.6])
-BASES = {
-    "metal": Conductor(alpha=0.2, eta=[0.201, 0.924, 1.102], k=[3.913, 2.453, 2.142]),
-    "diffuse": Lambert(albedo=[0.5, 0.4, 0.3]),
-}
+BASES = {"metal": COPPER, "diffuse": Lambert(albedo=[0.5, 0.4, 0.3])}
 AIMED = {
     ("faithful, metal", None): "1.5, 130",
     ("faithful, metal", 1e-4): "1.2, 106",

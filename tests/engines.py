@@ -102,7 +102,7 @@ def _folder(packages: tuple[str, ...]) -> Path | None:
 
 
 def needs(packages: tuple[str, ...]) -> pytest.MarkDecorator:
-    """The mark of a module that draws with them."""
+    """The mark of a module that draws with them. What is installed for the tests is of Python alone: without them it is skipped."""
     why = f"npm install {' '.join(packages)}, and name its node_modules in NODE_PATH"
     return pytest.mark.skipif(_folder(packages) is None, reason=why)
 

@@ -9,7 +9,7 @@ import pytest
 import typer.main
 from interrupts import PLAN, write_panel
 
-from commands import layerfit, process, write_reference
+from commands import SCENE, layerfit, process, write_reference
 from layerfit.cli import app
 from layerfit.preset import read_preset
 from layerfit.render import brdf_values
@@ -50,20 +50,6 @@ LESS = {
 SLOW = ("fit", "structures", "batch", "advise", "truth", "tradeoff", "specialise", "demo")
 
 
-MATERIAL = """\
-[material]
-layers = [{ type = "coat", alpha = 0.3, eta = 1.4, tau = [0.3, 0.3, 0.3] }]
-[material.base]
-type = "conductor"
-alpha = 0.4
-eta = [0.201, 0.924, 1.102]
-k = [3.913, 2.453, 2.142]
-[fit]
-free = ["coat.alpha", "base.alpha"]
-"""
-"""Where a fit of a measurement starts."""
-
-
 @pytest.fixture(scope="module")
 def workplace(tmp_path_factory):
     """Every file that an example names; in place of the references that ship, and of what others measured, small ones."""
@@ -75,9 +61,8 @@ def workplace(tmp_path_factory):
         shutil.copy(scene, shipped / f"{name}.toml")
     scene.unlink()
     shutil.copytree(shipped, folder / "captures")
-    scene = (shipped / "lacquered_copper.toml").read_text()
     every_start_has = 'free = ["coat.alpha", "coat.eta", "base.alpha"]'
-    (folder / "scene.toml").write_text(re.sub("free = .*", every_start_has, scene))
+    (folder / "scene.toml").write_text(re.sub("free = .*", every_start_has, SCENE))
     for name in ("reference.exr", "render.exr"):
         shutil.copy(shipped / "reference.exr", folder / name)
     (folder / "out" / "copper").mkdir(parents=True)
@@ -91,11 +76,12 @@ def workplace(tmp_path_factory):
     coat = 'layers = [{ type = "coat", eta = 1.5, alpha = 0.1, absorption_per_mm = 20, thickness_um = 30 }]'
     panel.write_text(panel.read_text().replace("[material]", f"[material]\n{coat}"))
     stack = read_preset(shipped / "truth.json")
-    for measured in ("paint", "paper_white_rgb", "cg_sunflower_rgb"):
-        write_rgl(folder / f"{measured}.bsdf", lambda wi, wo: brdf_values(stack, wi, wo))
-    for measured in ("krylon_blue", "cayman"):
-        write_cornell(folder / f"{measured}.brdf", lambda wi, wo, nm: brdf_values(stack, wi, wo)[:, :1] * np.ones_like(nm))
-    (folder / "paint.toml").write_text(f'[reference]\nbrdf = "paint.bsdf"\n{MATERIAL}')
+    for word in {word for example in EXAMPLES for word in shlex.split(example)}:
+        if word.endswith(".bsdf"):
+            write_rgl(folder / word, lambda wi, wo: brdf_values(stack, wi, wo))
+        elif word.endswith(".brdf"):
+            write_cornell(folder / word, lambda wi, wo, nm: brdf_values(stack, wi, wo)[:, :1] * np.ones_like(nm))
+    (folder / "paint.toml").write_text('[reference]\nbrdf = "paint.bsdf"\n[material]' + SCENE.partition("[material]")[2])
     return folder
 
 
