@@ -75,12 +75,12 @@ class Ran:
     err: str
 
 
-def layerfit(*arguments: Any) -> Ran:
-    """Run the command line in this process, up to its exit. Where it would end with a traceback, this raises."""
+def layerfit(*arguments: Any, columns: int = 120) -> Ran:
+    """Run the command line in this process, up to its exit. Where it would end with a traceback, this raises. `columns`: of the terminal."""
     out, err = io.StringIO(), io.StringIO()
     with (
         mock.patch.object(sys, "argv", ["layerfit", *map(str, arguments)]),
-        mock.patch.dict(os.environ, {"LAYERFIT_NO_CACHE": "1", "COLUMNS": "120"}),
+        mock.patch.dict(os.environ, {"LAYERFIT_NO_CACHE": "1", "COLUMNS": str(columns)}),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
     ):

@@ -5,6 +5,7 @@ import importlib
 import pkgutil
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -87,8 +88,13 @@ def module_name(file: Path) -> str:
 MODULES = {module_name(file): file for file in FILES}
 
 
-def imports(name: str) -> Iterator[str]:
+@cache
+def imports(name: str) -> list[str]:
     """Absolute names of all that a module imports, wherever in the file; `from a import b` gives a.b."""
+    return list(_imports(name))
+
+
+def _imports(name: str) -> Iterator[str]:
     package = ["layerfit", *name.split(".")] if name else ["layerfit"]
     if MODULES[name].name != "__init__.py":
         package.pop()

@@ -9,7 +9,7 @@ import pytest
 import typer.main
 from interrupts import PLAN, write_panel
 
-from commands import SCENE, layerfit, process, write_reference
+from commands import SCENE, layerfit, write_reference
 from layerfit.cli import app
 from layerfit.preset import read_preset
 from layerfit.render import brdf_values
@@ -102,18 +102,14 @@ def test_every_command_has_an_example():
     assert {example.split()[1] for example in HELP} == set(COMMANDS)
 
 
-def said(*words, columns):
-    return process(*words, "--help", environment={"COLUMNS": str(columns)}).out
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_fits_a_narrow_terminal(command):
-    text = said(command, columns=60)
+    text = layerfit(command, "--help", columns=60).out
     assert "\x1b" not in text
     assert max(len(line) for line in text.splitlines() if not re.match(r" +layerfit ", line)) <= 60  # a command is not cut
 
 
 def test_the_list_of_commands_is_not_cut():
-    lines = re.findall(r"^  [a-z-]+  +(.*)$", said(columns=80).partition("Commands:\n")[2], re.MULTILINE)
+    lines = re.findall(r"^  [a-z-]+  +(.*)$", layerfit("--help", columns=80).out.partition("Commands:\n")[2], re.MULTILINE)
     assert len(lines) >= len(COMMANDS)
     assert not [line for line in lines if line.endswith("...")]

@@ -6,21 +6,24 @@ cosine, and a width in a sum of widths. Degrees are lowered one by one while the
 """
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._compiled import Compiled
 from .._directions import FLOOR as OF_WHITE, random_pairs, random_places
 from .._place import narrowed
 from ..forms.corrected import Corrected
 from ..forms.faithful import Faithful
 from ..forms.precise import Precise
 from ..layers import Coat
-from ..render import brdf
-from ..stack import Stack, at, evaluate
+from ..render import compiled_brdf
+from ..stack import Stack, at, evaluate, prepared as prepare
 from ..surfaces.diffuse import Lambert
 from ..surfaces.flakes import Flakes
 from ..surfaces.microfacet import Conductor
@@ -92,7 +95,7 @@ def tables(stack: Stack, max_error: float | None = None, entries: int | None = N
     if not paper.base.lobes:
         return f"{paper.base.name} is diffuse, and over it there is nothing to look up but the coat's top"
     with jax.enable_x64(True):
-        prepared, judge = paper.astype(np.float64).prepare(), _Judge(stack.astype(np.float64), 2)
+        prepared, judge = prepare(paper.astype(np.float64)), _Judge(stack.astype(np.float64), 2)
         for count in _doubled() if max_error is not None and entries is None else [entries or precomputed.ENTRIES]:
             base = precomputed.made(prepared, stack.base.name, count)
             error = judge.error(base)
@@ -112,7 +115,7 @@ def largest_error(other: Stack, stack: Stack) -> float:
     """Largest relative error of a material against `stack`."""
     with jax.enable_x64(True):
         judge = _Judge(stack.astype(np.float64), 2)
-        return judge.compared(np.asarray(_exact(other.astype(np.float64), judge.wi, judge.wo, judge.place)))
+        return judge.compared(np.asarray(compiled_brdf(other.astype(np.float64), judge.wi, judge.wo, judge.place)))
 
 
 def _compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
@@ -122,15 +125,16 @@ def _compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
         return f"what polynomials would follow ({', '.join(lost)}) has no values to fit, as of a base that is not seen"
     fitted, others = (_Judge(stack, seed) for seed in (1, 2))
     full = {name: curve.most for name, curve in recipe.curves.items()}
-    best = fitted.error(_padded(recipe, full))
+    padded = _padded(recipe)
+    best = fitted.error(padded(full))
     if best > max_error:
         return f"its error stays at {best:.1e}, and {max_error:.1e} is asked for"
     for margin in MARGIN:
-        degrees = _lowered(recipe, full, fitted, margin * max_error)
-        error = others.error(_padded(recipe, degrees))
+        degrees = _lowered(recipe, full, lambda degrees: fitted.error(padded(degrees)), margin * max_error)
+        error = others.error(padded(degrees))
         if error <= max_error:
             made = recipe.build({name: curve.fit(degrees[name]) for name, curve in recipe.curves.items()})
-            error = max(error, fitted.error(_padded(recipe, degrees)))
+            error = max(error, fitted.error(padded(degrees)))
             of = f"the {type(stack.form).__name__.lower()} form" if stack.layers else "a bare metal"
             note = f"Compact tier of {of}: within {error:.1e} of it, relative, over random and extreme directions."
             return dataclasses.replace(stack, layers=(), base=noted(made, note)).astype(np.float32), error
@@ -138,7 +142,7 @@ def _compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
 
 
 def _recipe(stack: Stack) -> Recipe:
-    prepared: Any = stack.prepare()
+    prepared: Any = prepare(stack)
     name = stack.base.name
     if not stack.layers:
         return bare.recipe(prepared, name)
@@ -149,19 +153,22 @@ def _recipe(stack: Stack) -> Recipe:
     return (precise_metal if isinstance(stack.form, Precise) else corrected_stack).recipe(prepared, name)
 
 
-def _padded(recipe: Recipe, degrees: dict[str, int]) -> Compact:
-    """The material with polynomials of these degrees, all of the same shape: what judges it is compiled once."""
-    return recipe.build({name: curve.fit(degrees[name], MOST + 1) for name, curve in recipe.curves.items()})
+def _padded(recipe: Recipe) -> Callable[[dict[str, int]], Compact]:
+    """The material with polynomials of given degrees, all of the same shape: what judges it is compiled once. Each is fitted once."""
+    fit = cache(lambda name, degree: recipe.curves[name].fit(degree, MOST + 1))
+    return lambda degrees: recipe.build({name: fit(name, degree) for name, degree in degrees.items()})
 
 
-def _lowered(recipe: Recipe, full: dict[str, int], judge: "_Judge", max_error: float) -> dict[str, int]:
+def _lowered(
+    recipe: Recipe, full: dict[str, int], error: Callable[[dict[str, int]], float], max_error: float
+) -> dict[str, int]:
     """Degrees as low as the error allows: one less of each in turn, of the widest vectors first, which cost most."""
     degrees = dict(full)
     size = lambda name: np.size(recipe.curves[name].y[0])  # noqa: E731
     left = sorted(recipe.curves, key=size, reverse=True)
     while left := [name for name in left if degrees[name] > 1]:
         for name in list(left):
-            if judge.error(_padded(recipe, degrees | {name: degrees[name] - 1})) <= max_error:
+            if error(degrees | {name: degrees[name] - 1}) <= max_error:
                 degrees[name] -= 1
             else:
                 left.remove(name)
@@ -175,20 +182,19 @@ class _Judge:
         self.wi, self.wo = (jnp.asarray(w, float) for w in random_pairs(PAIRS, seed))
         there = narrowed(random_places(PAIRS, seed), stack.reads)
         self.place = jax.tree.map(lambda a: jnp.asarray(a, float), there)
-        self.exact = np.asarray(_exact(stack, self.wi, self.wo, self.place))
+        self.exact = np.asarray(compiled_brdf(stack, self.wi, self.wo, self.place))
         self.scale = np.maximum(np.abs(self.exact), FLOOR)
 
     def error(self, made: Compact) -> float:
-        return self.compared(np.asarray(_values(made, self.wi, self.wo, self.place)))
+        return self.compared(np.asarray(_judged(made, self.wi, self.wo, self.place)))
 
     def compared(self, values: np.ndarray) -> float:
         error = np.abs(values - self.exact) / self.scale
         return float(np.max(np.where(np.isfinite(error), error, np.inf)))
 
 
-_exact = jax.jit(brdf)
-
-
-@jax.jit
 def _values(made: Compact, wi: Any, wo: Any, place: Any) -> Any:
     return jax.vmap(lambda i, o, there: jnp.broadcast_to(at(made, there).evaluate(i, o), (3,)))(wi, wo, place)
+
+
+_judged = Compiled(_values, optimise=0)

@@ -4,6 +4,8 @@ import dataclasses
 from dataclasses import replace
 from typing import Literal, get_args
 
+import jax
+
 from ..documents import nearest
 from ..errors import InputError
 from ..forms.faithful import Faithful
@@ -94,7 +96,7 @@ def _other(stack: Stack, name: Name) -> Stack:
     if other is None or (other.form == stack.form and name == "faithful"):
         raise InputError(f"there is no tier {name} of this material: it would not differ from the exact one")
     try:
-        other.prepare()
+        jax.eval_shape(Stack.prepare, other)
     except ValueError as error:
         raise InputError(f"there is no tier {name} of this material: {error}") from None
     return other

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._compiled import Compiled, fusion_emitters
+from ..layers import Coat
 from ..stack import Stack
 from ._material import Haze, Interface, Material, read
 from ._particle import Tally, start, step
@@ -122,7 +123,13 @@ def begin(stack: Stack, interface: Interface, haze: Mapping[str, Haze]) -> None:
 
 def top_lobe(stack: Stack, wi: Any, wo: Any) -> np.ndarray:
     """BRDF [1/sr] of the top interface alone, one reflection, (n, 3): `wi` (3,) or (n, 3), `wo` (n, 3)."""
-    wi = jnp.broadcast_to(jnp.asarray(wi, float), np.shape(wo))
-    coat = stack.astype(wi.dtype).layers[0]
-    lobe = jax.vmap(lambda i, o: jnp.broadcast_to(coat.evaluate(i, o), (3,)))(wi, jnp.asarray(wo, wi.dtype))
-    return np.asarray(lobe)
+    wo = jnp.asarray(wo, float)
+    coat = stack.astype(wo.dtype).layers[0]
+    return np.asarray(_lobes(coat, jnp.broadcast_to(jnp.asarray(wi, wo.dtype), wo.shape), wo))
+
+
+def _top(coat: Coat, wi: jax.Array, wo: jax.Array) -> jax.Array:
+    return jax.vmap(lambda i, o: jnp.broadcast_to(coat.evaluate(i, o), (3,)))(wi, wo)
+
+
+_lobes = Compiled(_top, optimise=0)
