@@ -35,9 +35,9 @@ _OPTIMISED = OPTIONS[_LEVEL]
 _COMPILED = None
 if "PYTEST_XDIST_WORKER" not in os.environ:
     _COMPILED = os.environ["JAX_COMPILATION_CACHE_DIR"] = tempfile.mkdtemp(prefix="layerfit-tests-")
-    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.1"
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.5"  # what compiles sooner is not worth its file
 jax.config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
-jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -54,8 +54,9 @@ if importlib.util.find_spec("beartype"):
 # Traces make objects by the million, few of them rubbish.
 gc.set_threshold(50_000, 20, 20)
 
-MOST_MEMORY = 4.0e9
-"""Bytes in memory above which what JAX keeps compiled is thrown away: a whole run would keep 6 GB."""
+WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+MOST_MEMORY = min(6.0e9, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / (WORKERS + 1))
+"""Bytes in memory above which what JAX keeps compiled is thrown away, which takes seconds, and to make it again some more."""
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -60,7 +60,8 @@ def test_lights_that_are_not_measured(lights):
 def test_times_are_relative_to_phong(gl, name, monkeypatch):
     """On a small target, and for all that a material may read. How long one takes is for a benchmark to say, not for a test."""
     monkeypatch.setattr(cost, "LEAST_MS", 1.0)
-    found = times({"phong": phong(), name: print_material(STACKS[name], "m")}, lights=2, rounds=5, side=128)
+    monkeypatch.setattr(cost, "SIDE", 128)
+    found = times({"phong": phong(), name: print_material(STACKS[name], "m")}, lights=2, rounds=5)
     assert all(np.all(np.isfinite(t.ratios)) and t.ratios.shape == (5,) and t.milliseconds > 0.0 for t in found.values())
     low, high = found[name].spread
     assert low <= found[name].median <= high

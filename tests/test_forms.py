@@ -35,6 +35,7 @@ from layerfit.surfaces.diffuse import oren_nayar_full, oren_nayar_qualitative
 
 DTYPES = [np.float64, np.float32]
 ROWS = 256  # one size everywhere: what is compiled for one test serves the next
+HALVES = slice(ROWS), slice(ROWS, None)
 
 # Directions whose cosine rounds to 1 in float64 have lost their sine; near total reflection a cosine is the root of a difference.
 ILL_CONDITIONED = 5e-9
@@ -181,6 +182,21 @@ def columns(*inputs):
     steps = [[np.full_like(x, j == k) for j, x in enumerate(leaves)] for k in range(len(leaves))]
     found = [along(inputs, jax.tree.unflatten(structure, step)) for step in steps]
     return found[0][0], np.stack([slopes for _, slopes in found])
+
+
+PRECISE = [name for name in STACKS if name.startswith("precise")]
+
+
+@pytest.mark.parametrize("name", PRECISE)
+def test_float32_is_enough(name):
+    wi, wo = hemisphere(2 * ROWS, 5), hemisphere(2 * ROWS, 6)
+    wide, narrow = (
+        np.concatenate([rows_of(STACKS[name].astype(dtype), wi[some].astype(dtype), wo[some].astype(dtype)) for some in HALVES])
+        for dtype in DTYPES
+    )
+    assert narrow.dtype == np.float32
+    np.testing.assert_allclose(narrow, wide, rtol=2e-3, atol=1e-5)
+    assert np.median(np.abs(narrow / wide - 1.0)) < 3e-6
 
 
 NOT_RECIPROCAL = {"faithful at the normal", "phong, faithful"}

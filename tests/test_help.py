@@ -39,6 +39,7 @@ EXAMPLES = list({kind(e): e for e in [*PAGES, *HELP] if e in HELP or e.split()[1
 
 LESS = {
     "fit": ["--starts", "1"],
+    "batch": ["--workers", "2"],
     "structures": ["--only", "diffuse,metal"],
     "truth": ["--paths", "1000"],
     "tradeoff": ["--paths", "1000", "--rounds", "3"],
@@ -90,6 +91,8 @@ def test_an_example_runs(example, workplace, gl, tmp_path, monkeypatch):
     folder = shutil.copytree(workplace, tmp_path / "here")
     monkeypatch.chdir(folder)
     monkeypatch.setattr("layerfit.demo.references", lambda: folder / "captures")
+    monkeypatch.setattr("layerfit.shader.cost.LEAST_MS", 0.1)
+    monkeypatch.setattr("layerfit.shader.cost.SIDE", 64)
     monkeypatch.setattr("layerfit.view.serve", lambda text, ready, open_browser: ready("http://127.0.0.1/"))
     words = shlex.split(example)[1:]
     ran = layerfit(*words, *LESS.get(words[0], ()))

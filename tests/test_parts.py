@@ -29,7 +29,7 @@ from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import held
 from layerfit.layers import Patina
 from layerfit.stability.grid import parameters
-from layerfit.stack import Stack
+from layerfit.stack import Stack, prepared
 from layerfit.surfaces import Conductor
 from test_properties import STRUCTURES, materials
 
@@ -113,10 +113,10 @@ def test_a_material_is_finite_and_not_negative(name):
 )
 def test_what_a_shader_holds_is_what_was_baked(name, form):
     """Of a precise material: the parts of its form, without the numbers that a shader may set."""
-    prepared = STRUCTURES[name].astype(np.float32).prepare()
-    constants = held(prepared)
+    made = prepared(STRUCTURES[name].astype(np.float32))
+    constants = held(made)
     assert set(constants) == set(form.HELD)
-    assert all(constants[key] is getattr(prepared, key) for key in constants)
+    assert all(constants[key] is getattr(made, key) for key in constants)
     assert not {"coat", "coats", "base"} & set(constants)
 
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from helpers import COPPER, STACKS, brdf_rows, direction, hemisphere, varnish
+from helpers import COPPER, brdf_rows, direction, hemisphere, varnish
 from layerfit.errors import InputError
 from layerfit.forms import corrected, curves, one_coat, precise, tables
 from layerfit.forms.one_coat import Crossing, Prepared
@@ -19,8 +19,6 @@ from layerfit.preset import preset_of, stack_of
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Dielectric, Lambert, OrenNayar
 from layerfit.walk import walk_rows
-
-PRECISE = [name for name in STACKS if name.startswith("precise")]
 
 
 def linear(x, nodes):
@@ -238,16 +236,6 @@ def test_interpolation_is_smooth_and_exact_for_parabolas():
     slope = jax.vmap(jax.grad(lambda x: curves._cubic(x, nodes) @ jnp.sin(3.0 * nodes)))
     below, above = slope(jnp.asarray(nodes[1:-1] - 1e-9)), slope(jnp.asarray(nodes[1:-1] + 1e-9))
     np.testing.assert_allclose(below, above, atol=1e-6)
-
-
-@pytest.mark.parametrize("name", PRECISE)
-def test_float32_is_enough(name):
-    wi, wo = hemisphere(512, 5), hemisphere(512, 6)
-    wide = brdf_rows(STACKS[name].astype(np.float64), wi, wo)
-    narrow = brdf_rows(STACKS[name].astype(np.float32), wi.astype(np.float32), wo.astype(np.float32))
-    assert narrow.dtype == np.float32
-    np.testing.assert_allclose(narrow, wide, rtol=2e-3, atol=1e-5)
-    assert np.median(np.abs(narrow / wide - 1.0)) < 3e-6
 
 
 def grazing_pairs():

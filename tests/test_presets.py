@@ -4,11 +4,9 @@ import dataclasses
 import json
 import re
 
-import jax
 import numpy as np
 import pytest
 
-from helpers import QUICKLY
 from layerfit._data import shaders
 from layerfit.errors import InputError
 from layerfit.optics.metals import metal
@@ -96,9 +94,6 @@ def test_a_preset_without_its_coat_is_one_too(tmp_path):
     assert preset_of(read_preset(tmp_path / "bare.json"), "bare") == preset_of(bare, "bare")
 
 
-BRDF = jax.jit(brdf, compiler_options=QUICKLY)
-
-
 def unnamed(stack: Stack) -> Stack:
     """The same material: what differs from another in its names alone is not compiled again."""
     layers = tuple(dataclasses.replace(layer, name=f"layer_{k}") for k, layer in enumerate(stack.layers))
@@ -114,6 +109,6 @@ def test_a_preset_sends_back_no_more_than_it_gets(path):
     wo = np.stack([x, y, np.sqrt(1.0 - u)], -1).astype(np.float32)  # by the cosine: the albedo is pi times the mean
     for theta in np.radians([5.0, 45.0, 75.0]):
         wi = np.broadcast_to([np.sin(theta), 0.0, np.cos(theta)], wo.shape).astype(np.float32)
-        albedo = np.pi * np.mean(BRDF(stack, wi, wo), 0)
+        albedo = np.pi * np.mean(brdf(stack, wi, wo), 0)
         assert np.max(albedo) > LEAST_ENERGY
         assert np.all(albedo < MOST_ENERGY), f"at {np.degrees(theta):.0f} degrees"

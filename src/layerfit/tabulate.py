@@ -9,7 +9,7 @@ import jax
 import numpy as np
 
 from .capture.measured.table import DIRECTIONS, VALUES, read_columns, unit_pairs
-from .render import compiled_brdf
+from .render import brdf
 from .stack import Stack
 from .walk import Estimate
 
@@ -34,7 +34,7 @@ def evaluate_table(stack: Stack, path: Path, truth: Truth | None = None) -> str:
         values = np.column_stack([found.mean, found.se])
     elif len(table):
         with jax.enable_x64(True):
-            values = np.asarray(compiled_brdf(stack.astype(np.float64), table[:, :3], table[:, 3:]))
+            values = np.asarray(brdf(stack.astype(np.float64), table[:, :3], table[:, 3:]))
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([*DIRECTIONS, *names])

@@ -17,7 +17,7 @@ from .documents import check_directory, finite, nearest, write_files
 from .errors import InputError
 from .fit.words import structure
 from .preset import MODELS, model_name
-from .render import compiled_brdf
+from .render import brdf
 from .report import truth as report
 from .report.told import Told
 from .stack import FORMS, Stack
@@ -162,7 +162,7 @@ def below(stack: Stack, fans: Sequence[Fan], of: Stack | None = None) -> list[np
     wo = np.concatenate([fan.wo for fan in fans])
     # The lobe that is taken off may be 1e5 times what is left of it: too much for the digits of float32.
     with jax.enable_x64(True):
-        whole = np.asarray(compiled_brdf(stack.astype(np.float64), wi, wo))
+        whole = np.asarray(brdf(stack.astype(np.float64), wi, wo))
         top = np.concatenate([top_lobe(of or stack, fan.wi, fan.wo) for fan in fans])
     return np.split(whole - top, np.cumsum([len(fan.wo) for fan in fans])[:-1])
 

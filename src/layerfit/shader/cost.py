@@ -127,14 +127,12 @@ def _kind(instruction: str) -> str:
     return words[3] if words[0] == "OpExtInst" else words[0]
 
 
-def times(
-    shaders: Mapping[str, Shader], lights: int = 1, rounds: int = ROUNDS, side: int = SIDE, seed: int = 0
-) -> dict[str, Timing]:
+def times(shaders: Mapping[str, Shader], lights: int = 1, rounds: int = ROUNDS, seed: int = 0) -> dict[str, Timing]:
     """Time shaders by timer queries, or processor time where the driver is software, each round all of them and Phong in an order of its own.
 
     Raises `MachineError` where there is no driver, or it does not compile one of them.
     """
-    drawings = [_Drawing(shader, lights, side) for shader in (phong(), *shaders.values())]
+    drawings = [_Drawing(shader, lights) for shader in (phong(), *shaders.values())]
     rng = np.random.default_rng(seed)
     taken = np.empty((rounds, len(drawings)))
     try:
@@ -151,7 +149,7 @@ def times(
 class _Drawing:
     """A shader ready to be drawn over a whole float target."""
 
-    def __init__(self, shader: Shader, lights: int, side: int) -> None:
+    def __init__(self, shader: Shader, lights: int) -> None:
         ctx = context()
         attributes = _attributes()
         self.program = compile_points(cost_text(shader, lights), {name: a.shape[1] for name, a in attributes.items()})
@@ -162,7 +160,7 @@ class _Drawing:
             (buffer, f"{a.shape[1]}f", f"a_{name}") for buffer, (name, a) in zip(self.buffers, used.items(), strict=True)
         ]
         self.array = ctx.vertex_array(self.program, content)
-        self.size = side, side
+        self.size = SIDE, SIDE
         # What the timer queries of software tell holds the waiting for other programs: a tenth to twice the work on a busy machine.
         self.clock = _processor_time if in_software() else _timer_query
         self.draws = 1

@@ -22,7 +22,7 @@ from ..forms.corrected import Corrected
 from ..forms.faithful import Faithful
 from ..forms.precise import Precise
 from ..layers import Coat
-from ..render import compiled_brdf
+from ..render import brdf
 from ..stack import Stack, at, evaluate, prepared as prepare
 from ..surfaces.diffuse import Lambert
 from ..surfaces.flakes import Flakes
@@ -115,7 +115,7 @@ def largest_error(other: Stack, stack: Stack) -> float:
     """Largest relative error of a material against `stack`."""
     with jax.enable_x64(True):
         judge = _Judge(stack.astype(np.float64), 2)
-        return judge.compared(np.asarray(compiled_brdf(other.astype(np.float64), judge.wi, judge.wo, judge.place)))
+        return judge.compared(np.asarray(brdf(other.astype(np.float64), judge.wi, judge.wo, judge.place)))
 
 
 def _compact(stack: Stack, max_error: float) -> tuple[Stack, float] | str:
@@ -182,7 +182,7 @@ class _Judge:
         self.wi, self.wo = (jnp.asarray(w, float) for w in random_pairs(PAIRS, seed))
         there = narrowed(random_places(PAIRS, seed), stack.reads)
         self.place = jax.tree.map(lambda a: jnp.asarray(a, float), there)
-        self.exact = np.asarray(compiled_brdf(stack, self.wi, self.wo, self.place))
+        self.exact = np.asarray(brdf(stack, self.wi, self.wo, self.place))
         self.scale = np.maximum(np.abs(self.exact), FLOOR)
 
     def error(self, made: Compact) -> float:

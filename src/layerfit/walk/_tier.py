@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from ..errors import InputError
-from ..render import compiled_brdf
+from ..render import brdf
 from ..stack import Stack
 from ..tiers.tier import WALK
 from ._material import hazes, interface_of, refuses
@@ -43,7 +43,7 @@ def walked(stack: Stack, name: str, paths: int = PATHS) -> Callable[[np.ndarray,
                 f"{len(wo)} pairs of directions, {paths} paths each: too many for one command; ask for fewer --paths, or a smaller picture"
             )
         with jax.enable_x64(True):
-            exact = top_lobe(stack, wi, wo) if stack.layers else np.asarray(compiled_brdf(stack.astype(np.float64), wi, wo))
+            exact = top_lobe(stack, wi, wo) if stack.layers else np.asarray(brdf(stack.astype(np.float64), wi, wo))
         if not stack.layers:  # a bare surface is its own truth
             return Estimate(exact, np.zeros_like(exact))
         below = walk(stack, wi, wo, paths=paths, interface=interface, haze=hazes(stack))
