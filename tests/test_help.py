@@ -39,7 +39,6 @@ EXAMPLES = list({kind(e): e for e in [*PAGES, *HELP] if e in HELP or e.split()[1
 
 LESS = {
     "fit": ["--starts", "1"],
-    "batch": ["--workers", "2"],
     "structures": ["--only", "diffuse,metal"],
     "truth": ["--paths", "1000"],
     "tradeoff": ["--paths", "1000", "--rounds", "3"],
