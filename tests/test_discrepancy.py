@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from helpers import COPPER, sphere_view
+from layerfit.capture.exr import write_exr
 from layerfit.capture.samples import View
+from layerfit.capture.scene import EnvironmentMap
 from layerfit.fit import discrepancy
 from layerfit.fit.discrepancy import PLACES, unmeasured
 from layerfit.fit.fit import fit
@@ -17,7 +19,7 @@ from layerfit.forms.corrected import Corrected
 from layerfit.layers import Coat, Patina
 from layerfit.render import predict
 from layerfit.stack import Stack
-from layerfit.surfaces import Conductor
+from layerfit.surfaces import Conductor, Lambert
 from layerfit.walk import top_lobe, walk_rows
 
 pytestmark = pytest.mark.optimised
@@ -94,6 +96,24 @@ def test_a_pixel_sees_all_of_its_surface(tmp_path):
     at_centre, over_pixel = (np.abs(f / wanted - 1.0)[bright] for f in (coarse.target[which], np.mean(inside, 0)))
     assert np.max(at_centre) > 0.05
     assert np.max(over_pixel) < 0.1 * np.max(at_centre)
+
+
+def test_a_pixel_sees_all_of_its_surface_under_a_map(tmp_path):
+    """The same of light from a map, by quadratures that draw the same numbers at all places of a pixel."""
+    stack = Stack((Coat(alpha=0.07, eta=1.8),), Lambert(albedo=[0.1, 0.1, 0.1]), Corrected())
+    height, width = 16, 32
+    lamp = np.full((height, width), 0.1)
+    lamp[4:6, 18:20] = 50.0
+    write_exr(tmp_path / "map.exr", dict.fromkeys("RGB", lamp))
+    light = (EnvironmentMap(tmp_path / "map.exr"),)
+    view = sphere_view(stack, tmp_path, 24)
+    view = dataclasses.replace(view, reference=dataclasses.replace(view.reference, lights=light))
+    at = [view.moved(np.arange(len(view.index)), dx, dy) for dx in PLACES for dy in PLACES]
+    centre, *inside = (predict(stack, *v.samples(quadrature=4000).arrays[:3]) for v in (view, *at))
+    wanted = centre - np.mean(inside, 0)
+    found = discrepancy._extent(stack, view, view.index)
+    assert np.max(np.abs(wanted)) > 0.05 * np.max(centre), "a lamp's image is narrower than a pixel"
+    assert np.linalg.norm(found - wanted) < 0.4 * np.linalg.norm(wanted), "of 496 directions"
 
 
 def test_a_bare_surface_has_no_error(tmp_path):

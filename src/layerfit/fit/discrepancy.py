@@ -17,8 +17,9 @@ from .. import walk
 from .._compiled import Compiled
 from ..capture.load import AnyView
 from ..capture.samples import Samples, View
-from ..render import brdf_values
+from ..render import brdf_values, predict
 from ..stack import Stack
+from .pixels import directions
 from .uncertainty import newton
 
 PAIRS = 512
@@ -29,6 +30,9 @@ PATHS = 2000
 
 PLACES = (-0.375, -0.125, 0.125, 0.375)
 """Parts of a pixel, along each of its sides: light comes from all of it, and the fit looks at its centre."""
+
+FEW_PLACES = (-0.5 / 3.0**0.5, 0.5 / 3.0**0.5)
+"""The same where light is a quadrature, many directions a place: Gauss's two points, for light from everywhere changes slowly within a pixel."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,12 +110,20 @@ def _off(stack: Stack, view: AnyView, samples: Samples, pixels: np.ndarray, rng:
     wi, wo, weight = samples.wi[pixels, light], samples.wo[pixels], samples.weight[pixels, light]
     form = brdf_values(stack, wi, wo)
     walked = walk.walk(stack, wi, wo, paths=PATHS, interface=walk.interface_of(stack), haze=walk.hazes(stack))
-    off = (form - _top(stack, wi, wo) - walked.mean) * weight
-    if isinstance(view, View) and view.exact:
-        which = np.searchsorted(view.index, samples.index[pixels])
-        inside = [view.moved(which, dx, dy).samples() for dx in PLACES for dy in PLACES]
-        off += form * weight - np.mean([brdf_values(stack, s.wi[each, light], s.wo) * s.weight[each, light] for s in inside], 0)
-    return off / chance[each, light, None]
+    off = (form - _top(stack, wi, wo) - walked.mean) * weight / chance[each, light, None]
+    return off + _extent(stack, view, samples.index[pixels]) if isinstance(view, View) else off
+
+
+def _extent(stack: Stack, view: View, index: np.ndarray) -> np.ndarray:
+    """Radiance at the centres of pixels less that of all of them, (pixels, 3). Quadratures draw the same numbers at all places of a pixel."""
+    which = np.searchsorted(view.index, index)
+
+    def seen(dx: float, dy: float) -> np.ndarray:
+        samples = view.moved(which, dx, dy).samples(quadrature=directions(view))
+        return predict(stack, samples.wi, samples.wo, samples.weight)
+
+    places = PLACES if view.exact else FEW_PLACES
+    return seen(0.0, 0.0) - np.mean([seen(dx, dy) for dx in places for dy in places], 0)
 
 
 def _lobe(coat: Any, wi: Any, wo: Any) -> Any:
