@@ -116,14 +116,15 @@ def _off(stack: Stack, view: AnyView, samples: Samples, pixels: np.ndarray, rng:
 
 def _extent(stack: Stack, view: View, index: np.ndarray) -> np.ndarray:
     """Radiance at the centres of pixels less that of all of them, (pixels, 3). Quadratures draw the same numbers at all places of a pixel."""
-    which = np.searchsorted(view.index, index)
+    drawn, back = np.unique(index, return_inverse=True)
+    which = np.searchsorted(view.index, drawn)
 
     def seen(dx: float, dy: float) -> np.ndarray:
         samples = view.moved(which, dx, dy).samples(quadrature=directions(view))
         return predict(stack, samples.wi, samples.wo, samples.weight)
 
     places = PLACES if view.exact else FEW_PLACES
-    return seen(0.0, 0.0) - np.mean([seen(dx, dy) for dx in places for dy in places], 0)
+    return (seen(0.0, 0.0) - np.mean([seen(dx, dy) for dx in places for dy in places], 0))[back]
 
 
 def _lobe(coat: Any, wi: Any, wo: Any) -> Any:
