@@ -57,7 +57,7 @@ class Linear:
         spread = self.const["wid"] * self.look("w", mu) * self.alpha
         mean, theta = curves.inverse_gaussian(self.look("kt", mu), np.exp(self.look("lt", mu)))
         values = T, spread, 1.0 + mean, theta, 0.0
-        return Crossing(jnp.array([*xy, np.sqrt(1.0 - bent**2)]), *map(jnp.asarray, values))
+        return Crossing(jnp.array([*xy, np.sqrt(1.0 - bent**2)]), *map(jnp.asarray, values), jnp.asarray(w))
 
     def returned(self, tau):
         x, weight = np.polynomial.legendre.leggauss(64)
@@ -121,7 +121,7 @@ def errors(oracle, interface, kind):
 @pytest.mark.parametrize("interface", ["single", "multi"])
 @pytest.mark.parametrize(
     ("kind", "narrow", "p50", "p90"),
-    [("lambert", False, 0.01, 0.02), ("conductor", False, 0.04, 0.12), ("conductor", True, 0.05, 0.17)],
+    [("lambert", False, 0.01, 0.02), ("conductor", False, 0.03, 0.11), ("conductor", True, 0.035, 0.18)],
 )
 def test_it_is_near_to_the_walk(oracle, interface, kind, narrow, p50, p90):
     error, width = errors(oracle, interface, kind)
@@ -401,13 +401,18 @@ def test_its_interface_is_kept_in_a_preset_and_checked():
         stack_of({"model": "precise", "base": METAL}, "here")
 
 
-@pytest.mark.parametrize("indices", [(1.000002,), (1.0, 1.0), (1.5, 1.0), (1.0, 1.000002)])
-def test_grazing_light_near_index_1_has_its_digits(indices):
-    """Both the squared cosine and what refraction adds to it are some 1e-6 there: as a sine of nearly 1 neither has digits."""
+@pytest.mark.parametrize(
+    ("indices", "digits"), [((1.000002,), 5e-5), ((1.0, 1.0), 5e-5), ((1.5, 1.0), 5e-5), ((1.0, 1.000002), 5e-5)]
+)
+def test_grazing_light_near_index_1_has_its_digits(indices, digits):
+    """Both the squared cosine and what refraction adds to it are some 1e-6 there: as a sine of nearly 1 neither has digits.
+
+    Out of a denser coat into air the bends of two tops nearly cancel: what is left has an error of 2e-7, which moves values by 3e-4.
+    """
     coats = tuple(Coat(name=f"coat {k}", alpha=0.1, eta=n, tau=0.02) for k, n in enumerate(indices))
     stack = Stack(coats, Conductor(alpha=0.2, eta=0.2, k=3.5), Precise()).astype(np.float32)
     wi, wo = (np.float32([direction(*angles)]) for angles in ((89.9, 20.0), (35.0, 170.0)))
     double = jax.tree.map(lambda x: np.asarray(x, float), (stack, wi, wo))
     with jax.enable_x64(False):
         found = np.asarray(brdf_rows(stack, wi, wo))
-    np.testing.assert_allclose(found, brdf_rows(*double), rtol=5e-5)
+    np.testing.assert_allclose(found, brdf_rows(*double), rtol=digits)

@@ -155,12 +155,13 @@ def check(paths: list[Path], model: str) -> None:
 
 CONSTANTS = {
     "WIDTH": (curves,),
-    "STEER": (curves,),
+    "BOTH": (curves,),
     "AGAIN": (bounces,),
     "CONDENSE": (one_coat,),
     "RISE": (one_coat,),
     "RATIO": (one_coat,),
     "TAIL": (one_coat,),
+    "DIRECT": (one_coat,),
 }
 """By name, with the modules that read them."""
 
@@ -168,7 +169,6 @@ CONSTANTS = {
 def fit(paths: list[Path]) -> None:
     """Levenberg-Marquardt on a smooth form of the error, constants scaled by their present values."""
     start = {name: getattr(modules[0], name) for name, modules in CONSTANTS.items()}
-    start |= {f"DIRECT{k}": v for k, v in enumerate(one_coat.DIRECT)}
     names, origin = list(start), np.array(list(start.values()))
     _loosen()
     sets = [(i, {key: jnp.asarray(x) for key, x in rows(paths, i, "conductor").items()}) for i in ("single", "multi")]
@@ -212,7 +212,6 @@ def _set(values: dict[str, Any]) -> None:
     for name, modules in CONSTANTS.items():
         for module in modules:
             setattr(module, name, values[name])
-    one_coat.DIRECT = tuple(values[f"DIRECT{k}"] for k in range(2))
 
 
 def main() -> None:

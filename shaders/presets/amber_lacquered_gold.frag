@@ -51,6 +51,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 struct Shares {
@@ -70,12 +71,12 @@ const Interface lf_shellac_interface = Interface(
     0.009790741,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.024019195, 0.037430365, -0.012146365, -0.008774286),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.01589695, -0.00900097),                                // passed_high: the other two, of higher powers
-    vec4(0.32968402, 0.022465572, -0.018672392, 0.013491154),     // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0060342997, 0.00026619434),                           // bend_high: 
-    vec4(0.7622598, -0.35900348, 0.3005035, -0.38898873),         // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.0026233941, 0.06684631),                               // spread_high: 
-    vec4(1.0406599, -0.085202515, 0.085663795, -0.05568254),      // path: mean path over that of the refracted direction
-    vec2(-0.0020405054, 0.017791867),                             // path_high: 
+    vec4(0.33006918, 0.021768995, -0.018093288, 0.013072789),     // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0058472306, 0.0002579987),                            // bend_high: 
+    vec4(0.6123964, -0.28842166, 0.24142314, -0.31251183),        // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.0021076351, 0.05370462),                               // spread_high: 
+    vec4(1.041125, -0.086186826, 0.086508214, -0.056506038),      // path: mean path over that of the refracted direction
+    vec2(-0.0011351705, 0.017382026),                             // path_high: 
     vec4(0.09075124, -0.2020707, 0.24339886, -0.256472),          // theta: scale of the path's distribution
     vec2(0.061698347, 0.08315918)                                 // theta_high: 
 );
@@ -87,21 +88,21 @@ const Conductor lf_gold = Conductor(
 );
 
 const Curve lf_shellac_again = Curve(
-    vec3(0.40891638, 0.3620838, 0.25310048),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.018592961, -0.015949883, -0.009579115),  // c1: 
-    vec3(0.05141133, 0.047353648, 0.032201283),      // c2: 
-    vec3(0.03234136, 0.026813328, 0.014909267),      // c3: 
-    vec3(-0.122347295, -0.10778068, -0.071430765),   // c4: 
-    vec3(-0.13266781, -0.113839954, -0.07283193)     // c5: 
+    vec3(0.4100702, 0.36309206, 0.25376877),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.016594969, -0.014080994, -0.0085702315),  // c1: 
+    vec3(0.05046641, 0.04569278, 0.030768223),        // c2: 
+    vec3(0.0075026453, 0.005961269, 0.0017187893),    // c3: 
+    vec3(-0.12749544, -0.11129023, -0.07341422),      // c4: 
+    vec3(-0.108046174, -0.0935376, -0.05992484)       // c5: 
 );
 
 const Curve lf_shellac_rest = Curve(
-    vec3(0.9373171, 0.62408614, 0.29151306),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.07019104, -0.047252066, -0.022525381),  // c1: 
-    vec3(0.032596573, 0.021492511, 0.008981556),    // c2: 
-    vec3(0.03644508, 0.024715662, 0.0157561),       // c3: 
-    vec3(-0.18867716, -0.12918195, -0.06526566),    // c4: 
-    vec3(-0.20338768, -0.13721162, -0.07224263)     // c5: 
+    vec3(0.93964374, 0.62593496, 0.29271707),     // c0: coefficients of the powers of the curves' argument
+    vec3(-0.070628, -0.047082894, -0.02261091),   // c1: 
+    vec3(0.025602698, 0.014387652, 0.005096175),  // c2: 
+    vec3(0.02739495, 0.017852962, 0.011185825),   // c3: 
+    vec3(-0.18329307, -0.12210268, -0.06094294),  // c4: 
+    vec3(-0.19600588, -0.13269156, -0.06896056)   // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -145,7 +146,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -192,18 +193,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
+float lf_presence(float eta) {
+    return 2.0 - 1.0;
+}
+
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
-    float first = pow(max(i.a, 1e-30), 1.41);
-    float second = pow(max(o.a, 1e-30), 1.41);
-    float inverse = 1.0 / (base + first + second);
-    return Shares(base * inverse, first * inverse, second * inverse);
+    float base = alpha * (i.w.w + o.w.w);
+    float inverse = 1.0 / (base + i.a + o.a);
+    return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
 vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
-    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    vec3 turn = 0.8241 * share * (i.w.xyz + o.w.xyz);
     float z2 = x.w.w * x.w.w;
     z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
     return vec4(x.w.xyz - turn, sqrt(z2));
@@ -229,15 +233,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
-}
-
-// 0 where the indices match and there is no interface, 1 from 1.15 on.
-float lf_presence(float eta) {
-    return 2.0 - 1.0;
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -248,22 +247,20 @@ vec3 lf_amount(Curve curve, float s) {
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float width2 = pow(max(pow(max(base, 1e-30), 1.41) + (pow(max(i.a, 1e-30), 1.41) + pow(max(o.a, 1e-30), 1.41)), 1e-30), 1.4184397);
-    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t = i.w.xyz + o.w.xyz;
-    float v = dot(t, t) / width2;
-    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
-}
-
-// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
-float lf_wider(float alpha, float coat_alpha) {
-    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
+    float t = i.a + o.a;
+    float shared_ = base * t / max(base + t, 1e-14);
+    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
+    vec3 t2 = i.w.xyz + o.w.xyz;
+    float v = dot(t2, t2);
+    return width2 / (3.1415927 * (width2 * width2 + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * width2 + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
-float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * dot(i.w.xyz, o.w.xyz);
-    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+float lf_ahead(Crossing i, Crossing o, float alpha) {
+    vec3 apart = i.air.xyz - o.air.xyz;
+    float back = 0.5 * (dot(apart, apart) + i.air.w * i.air.w + o.air.w * o.air.w);
+    return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
@@ -286,10 +283,11 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_shellac.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_shellac.eta * lf_shellac.eta);
+    float there = lf_presence(lf_shellac.eta);
     Shares shares = lf_split(crossing, crossing2, lf_gold.alpha);
-    float part = 0.2675 + 0.5116 * shares.base * shares.base;
-    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float part = 0.7911 * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_shellac.tau);
@@ -299,12 +297,16 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec4 h = yi + yo;
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_gold.eta, lf_gold.k);
-    float rise = 1.0 + 0.468 * lf_presence(lf_shellac.eta) * lf_shellac.alpha * lf_shellac.alpha * shares.base;
+    float rise = 1.0 + 0.3861 * there * lf_shellac.alpha * lf_shellac.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_shellac_again, crossing.s) * lf_amount(lf_shellac_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_gold.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_gold.alpha, lf_shellac.alpha));
+    float shared_ = lf_gold.alpha * lf_gold.alpha / (lf_gold.alpha + lf_gold.alpha);
+    float t = sqrt(lf_gold.alpha * lf_gold.alpha + lf_gold.alpha * lf_gold.alpha + 3.173 * (shared_ * shared_));
+    float t2 = 0.4 * lf_shellac.alpha;
+    shared_ = t * t2 / (t + t2);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_gold.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
     vec3 root = lf_amount(lf_shellac_rest, crossing.s) * lf_amount(lf_shellac_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_shellac.eta, lf_gold.alpha);
-    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_gold.alpha) * lobes) + rest);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_gold.alpha);
+    vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_gold.alpha) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

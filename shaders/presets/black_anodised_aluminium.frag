@@ -53,6 +53,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec3 air;     // direction above
 };
 
 struct Shares {
@@ -69,18 +70,18 @@ const Coat lf_oxide = Coat(
 );
 
 const Interface lf_oxide_interface = Interface(
-    0.030373108,                                                // tilt: turn of the mean facet towards a grazing direction
-    0.051016223,                                                // gain: part of the reflected light that a second facet lets in
-    vec4(-0.03604947, 0.010694278, 0.02764687, 0.0047039147),   // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(-0.007703439, -0.0034511923),                          // passed_high: the other two, of higher powers
-    vec4(0.33328477, 0.08535605, -0.028874338, -0.0071616173),  // bend: part by which the sine of light becomes smaller below
-    vec2(0.0070798993, -0.001471281),                           // bend_high: 
-    vec4(0.8590729, -0.43609256, 0.091488555, 0.071232915),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.10349935, -0.044332564),                            // spread_high: 
-    vec4(1.1351962, -0.21217531, 0.06735343, 0.038279057),      // path: mean path over that of the refracted direction
-    vec2(-0.021671593, -0.0021164417),                          // path_high: 
-    vec4(0.41057786, -0.7462359, 0.3733016, 0.0021906942),      // theta: scale of the path's distribution
-    vec2(-0.08426255, 0.08728502)                               // theta_high: 
+    0.030373108,                                               // tilt: turn of the mean facet towards a grazing direction
+    0.051016223,                                               // gain: part of the reflected light that a second facet lets in
+    vec4(-0.03604947, 0.010694278, 0.02764687, 0.0047039147),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(-0.007703439, -0.0034511923),                         // passed_high: the other two, of higher powers
+    vec4(0.33516556, 0.08270949, -0.027979031, -0.006939888),  // bend: part by which the sine of light becomes smaller below
+    vec2(0.0068604946, -0.0014256835),                         // bend_high: 
+    vec4(0.6901757, -0.35035494, 0.07350148, 0.05722767),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.08315079, -0.035616696),                           // spread_high: 
+    vec4(1.1375977, -0.2171973, 0.07142246, 0.036595583),      // path: mean path over that of the refracted direction
+    vec2(-0.02201134, -0.001537323),                           // path_high: 
+    vec4(0.41057786, -0.7462359, 0.3733016, 0.0021906942),     // theta: scale of the path's distribution
+    vec2(-0.08426255, 0.08728502)                              // theta_high: 
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -91,36 +92,36 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.104854375, 0.10206635, 0.096675426),        // c0: coefficients of the powers of the curves' argument
-    vec3(0.0091195535, 0.008974072, 0.008701652),      // c1: 
-    vec3(0.004846167, 0.004751388, 0.0045690164),      // c2: 
-    vec3(0.013297945, 0.012933224, 0.012231156),       // c3: 
-    vec3(-0.006633155, -0.0063097626, -0.0056951344),  // c4: 
-    vec3(-0.013976812, -0.013466537, -0.012491435)     // c5: 
+    vec3(0.10512832, 0.10233162, 0.09692574),        // c0: coefficients of the powers of the curves' argument
+    vec3(0.0039771777, 0.003968766, 0.003958812),    // c1: 
+    vec3(0.0035903342, 0.0035373643, 0.0034351535),  // c2: 
+    vec3(0.015053809, 0.014642611, 0.013852969),     // c3: 
+    vec3(-0.01022438, -0.009831168, -0.0090812),     // c4: 
+    vec3(-0.018423304, -0.017812952, -0.01664579)    // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.23813432, 0.23644817, 0.23073103),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.003821373, -0.003863968, -0.003866382),  // c1: 
-    vec3(0.007524319, 0.0076254383, 0.007762745),    // c2: 
-    vec3(0.025510311, 0.025694638, 0.025834829),     // c3: 
-    vec3(-0.027204603, -0.027065605, -0.026538067),  // c4: 
-    vec3(-0.0379439, -0.037914604, -0.037513465)     // c5: 
+    vec3(0.24074851, 0.2390249, 0.23320916),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.004229646, -0.0042495914, -0.0042068027),  // c1: 
+    vec3(0.0035168603, 0.0036135986, 0.0037836134),    // c2: 
+    vec3(0.023410171, 0.02358684, 0.02374041),         // c3: 
+    vec3(-0.0261148, -0.025942713, -0.025363743),      // c4: 
+    vec3(-0.036583632, -0.036527455, -0.036093146)     // c5: 
 );
 
 const Interface lf_oxide_across = Interface(
-    0.07474731,                                               // tilt: turn of the mean facet towards a grazing direction
-    0.19855128,                                               // gain: part of the reflected light that a second facet lets in
-    vec4(-0.0848371, 0.031376388, -0.008033876, 0.03345237),  // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.01668107, -0.007443741),                           // passed_high: the other two, of higher powers
-    vec4(0.21767838, 0.10554002, 0.050390884, 0.0065075755),  // bend: part by which the sine of light becomes smaller below
-    vec2(-0.013838798, -0.008206964),                         // bend_high: 
-    vec4(0.6156385, -0.029582255, -0.07202415, -0.04607129),  // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.026856184, -0.013792217),                         // spread_high: 
-    vec4(1.272488, -0.24106231, -0.076749146, 0.038462996),   // path: mean path over that of the refracted direction
-    vec2(0.026356041, 0.0006901026),                          // path_high: 
-    vec4(0.9425542, -1.0819294, -0.15661979, 0.31639296),     // theta: scale of the path's distribution
-    vec2(0.092320696, -0.033271924)                           // theta_high: 
+    0.07474731,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.19855128,                                                // gain: part of the reflected light that a second facet lets in
+    vec4(-0.0848371, 0.031376388, -0.008033876, 0.03345237),   // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.01668107, -0.007443741),                            // passed_high: the other two, of higher powers
+    vec4(0.22314383, 0.10226743, 0.048828423, 0.006305933),    // bend: part by which the sine of light becomes smaller below
+    vec2(-0.013409704, -0.0079526305),                         // bend_high: 
+    vec4(0.49460143, -0.023766257, -0.05786392, -0.03701365),  // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.021576107, -0.011080474),                          // spread_high: 
+    vec4(1.2852762, -0.26076218, -0.07334012, 0.042782903),    // path: mean path over that of the refracted direction
+    vec2(0.026287615, -6.0915947e-05),                         // path_high: 
+    vec4(0.9425542, -1.0819294, -0.15661979, 0.31639296),      // theta: scale of the path's distribution
+    vec2(0.092320696, -0.033271924)                            // theta_high: 
 );
 
 // How much of a rough top's effect on light is by slopes along the tangent: half of it at the normal, all along the tangent.
@@ -187,7 +188,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, vec2 alpha, vec3 w) 
     vec2 a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec3(w.xy * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec3(w.xy * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -237,18 +238,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
+float lf_presence(float eta) {
+    return 2.0 - 1.0;
+}
+
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, vec2 alpha) {
-    vec2 base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.41));
-    vec2 first = pow(max(i.a, 1e-30), vec2(1.41));
-    vec2 second = pow(max(o.a, 1e-30), vec2(1.41));
-    vec2 inverse = 1.0 / (base + first + second);
-    return Shares(base * inverse, first * inverse, second * inverse);
+    vec2 base = alpha * (i.w.z + o.w.z);
+    vec2 inverse = 1.0 / (base + i.a + o.a);
+    return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
 vec3 lf_lean(Crossing x, Crossing i, Crossing o, vec2 share) {
-    vec2 turn = 1.099 * share * (i.w.xy + o.w.xy);
+    vec2 turn = 0.8241 * share * (i.w.xy + o.w.xy);
     float z2 = x.w.z * x.w.z;
     z2 = max(z2 + dot(turn, 2.0 * x.w.xy - turn), min(z2, 0.0004));
     return vec3(x.w.xy - turn, sqrt(z2));
@@ -274,15 +278,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
-}
-
-// 0 where the indices match and there is no interface, 1 from 1.15 on.
-float lf_presence(float eta) {
-    return 2.0 - 1.0;
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -293,24 +292,22 @@ vec3 lf_amount(Curve curve, float s) {
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, vec2 alpha) {
     vec2 base = alpha * M;
-    vec2 width2 = pow(max(pow(max(base, 1e-30), vec2(1.41)) + (pow(max(i.a, 1e-30), vec2(1.41)) + pow(max(o.a, 1e-30), vec2(1.41))), 1e-30), vec2(1.4184397));
+    vec2 t = i.a + o.a;
+    vec2 shared_ = base * t / max(base + t, 1e-14);
+    vec2 width2 = base * base + t * t + 3.173 * (shared_ * shared_);
     float size = sqrt(width2.x * width2.y);
-    vec2 t = base * base + 0.3109 * (i.a * i.a + o.a * o.a);
-    float x = 0.2559 * (size / sqrt(t.x * t.y) - 1.0);
+    t = base * base + 0.8294 * (i.a * i.a + o.a * o.a);
+    float x = 0.3431 * (size / sqrt(t.x * t.y) - 1.0);
     t = i.w.xy + o.w.xy;
-    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
-    return 1.0 / (3.1415927 * size * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
-}
-
-// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
-vec2 lf_wider(vec2 alpha, vec2 coat_alpha) {
-    return pow(pow(alpha, vec2(1.41)) + pow(alpha, vec2(1.41)) + pow(0.9226 * coat_alpha, vec2(1.41)), vec2(0.7092199));
+    float v = size * (t.x * t.x / width2.x + t.y * t.y / width2.y);
+    return size / (3.1415927 * (size * size + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * size + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
-float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * dot(i.w.xy, o.w.xy);
-    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+float lf_ahead(Crossing i, Crossing o, float alpha) {
+    vec2 apart = i.air.xy - o.air.xy;
+    float back = 0.5 * (dot(apart, apart) + i.air.z * i.air.z + o.air.z * o.air.z);
+    return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
@@ -337,11 +334,12 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float throughput = crossing.T * crossing2.T / (lf_oxide.eta * lf_oxide.eta);
     vec2 top = vec2(lf_oxide.alpha_x, lf_oxide.alpha_y);
     vec2 own = vec2(lf_aluminium.alpha_x, lf_aluminium.alpha_y);
+    float there = lf_presence(lf_oxide.eta);
     Shares shares = lf_split(crossing, crossing2, own);
     float share = 0.5 * (shares.base.x + shares.base.y);
-    float part = 0.2675 + 0.5116 * share * share;
-    vec3 yi = lf_lean(crossing, crossing, crossing2, shares.i);
-    vec3 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float part = 0.7911 * share;
+    vec3 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    vec3 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_oxide.tau);
@@ -352,12 +350,16 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float even = sqrt(0.5 * (lf_oxide.alpha_x * lf_oxide.alpha_x + lf_oxide.alpha_y * lf_oxide.alpha_y));
-    float rise = 1.0 + 0.468 * lf_presence(lf_oxide.eta) * even * even * share;
+    float rise = 1.0 + 0.3861 * there * even * even * share;
     vec3 again = F2 * (lf_amount(lf_oxide_again, crossing.s) * lf_amount(lf_oxide_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, lf_wider(own, top));
+    vec2 shared_ = own * own / (own + own);
+    vec2 t = sqrt(own * own + own * own + 3.173 * (shared_ * shared_));
+    vec2 t2 = 0.4 * top;
+    shared_ = t * t2 / (t + t2);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, sqrt(0.5 * (lf_aluminium.alpha_x * lf_aluminium.alpha_x + lf_aluminium.alpha_y * lf_aluminium.alpha_y)));
-    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, sqrt(0.5 * (lf_aluminium.alpha_x * lf_aluminium.alpha_x + lf_aluminium.alpha_y * lf_aluminium.alpha_y)));
+    vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

@@ -51,6 +51,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 struct Shares {
@@ -66,18 +67,18 @@ const Coat lf_glass = Coat(
 );
 
 const Interface lf_glass_interface = Interface(
-    0.0031546694,                                                 // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.0095665855, 0.02155129, -0.023891417, 0.015120622),   // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.006776768, -0.010278594),                              // passed_high: the other two, of higher powers
-    vec4(0.35250428, 0.004410565, -0.0013388395, 0.00059479475),  // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0070934147, 0.005697429),                             // bend_high: 
-    vec4(0.7543955, -0.22650662, -0.1283072, -0.057732522),       // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.4508241, -0.40081078),                                 // spread_high: 
-    vec4(1.0096664, -0.020288795, 0.014123917, -0.017482638),     // path: mean path over that of the refracted direction
-    vec2(0.037244797, -0.023303747),                              // path_high: 
-    vec4(0.020642612, -0.03597436, 0.01141594, -0.083641335),     // theta: scale of the path's distribution
-    vec2(0.14392288, -0.04268641)                                 // theta_high: 
+    0.0031546694,                                                // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                // gain: part of the reflected light that a second facet lets in
+    vec4(-0.0095665855, 0.02155129, -0.023891417, 0.015120622),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.006776768, -0.010278594),                             // passed_high: the other two, of higher powers
+    vec4(0.3525767, 0.004273914, -0.0012973398, 0.0005761385),   // bend: part by which the sine of light becomes smaller below
+    vec2(-0.006873429, 0.005520642),                             // bend_high: 
+    vec4(0.6060782, -0.18197447, -0.103081346, -0.0463818),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.36219025, -0.32201004),                               // spread_high: 
+    vec4(1.0097462, -0.020453185, 0.014133871, -0.017468095),    // path: mean path over that of the refracted direction
+    vec2(0.03760022, -0.023602962),                              // path_high: 
+    vec4(0.020642612, -0.03597436, 0.01141594, -0.083641335),    // theta: scale of the path's distribution
+    vec2(0.14392288, -0.04268641)                                // theta_high: 
 );
 
 const Conductor lf_silver = Conductor(
@@ -87,21 +88,21 @@ const Conductor lf_silver = Conductor(
 );
 
 const Curve lf_glass_again = Curve(
-    vec3(0.06153016, 0.11409618, 0.31868613),          // c0: coefficients of the powers of the curves' argument
-    vec3(0.00029183738, -0.0005030446, -0.006262228),  // c1: 
-    vec3(0.0047156177, 0.009853888, 0.03021495),       // c2: 
-    vec3(0.00978037, 0.022047073, 0.07574308),         // c3: 
-    vec3(-0.0033978596, -0.01047615, -0.04704483),     // c4: 
-    vec3(-0.008685246, -0.022395283, -0.08875987)      // c5: 
+    vec3(0.061484847, 0.11408435, 0.31908724),         // c0: coefficients of the powers of the curves' argument
+    vec3(0.0004953947, -0.00017339364, -0.005574994),  // c1: 
+    vec3(0.0049784184, 0.010460276, 0.032363757),      // c2: 
+    vec3(0.010293983, 0.023225099, 0.07975131),        // c3: 
+    vec3(-0.003522206, -0.010932565, -0.04926701),     // c4: 
+    vec3(-0.008758314, -0.022821188, -0.09099513)      // c5: 
 );
 
 const Curve lf_glass_rest = Curve(
-    vec3(0.22597377, 0.33390704, 0.7458091),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.011878207, -0.015880309, -0.033464015),  // c1: 
-    vec3(0.008575328, 0.009294793, 0.021119118),     // c2: 
-    vec3(0.040892154, 0.04512298, 0.077221334),      // c3: 
-    vec3(-0.02249311, -0.031728834, -0.08651626),    // c4: 
-    vec3(-0.04299441, -0.053283244, -0.12109262)     // c5: 
+    vec3(0.22621357, 0.3342644, 0.74630064),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.011936996, -0.015942246, -0.03353043),  // c1: 
+    vec3(0.008632608, 0.009264424, 0.02077511),     // c2: 
+    vec3(0.041101664, 0.0451276, 0.07673299),       // c3: 
+    vec3(-0.02266945, -0.0317944, -0.086229295),    // c4: 
+    vec3(-0.043732792, -0.05408135, -0.12162906)    // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -145,7 +146,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -192,18 +193,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
+float lf_presence(float eta) {
+    return 2.0 - 1.0;
+}
+
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
-    float first = pow(max(i.a, 1e-30), 1.41);
-    float second = pow(max(o.a, 1e-30), 1.41);
-    float inverse = 1.0 / (base + first + second);
-    return Shares(base * inverse, first * inverse, second * inverse);
+    float base = alpha * (i.w.w + o.w.w);
+    float inverse = 1.0 / (base + i.a + o.a);
+    return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
 vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
-    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    vec3 turn = 0.8241 * share * (i.w.xyz + o.w.xyz);
     float z2 = x.w.w * x.w.w;
     z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
     return vec4(x.w.xyz - turn, sqrt(z2));
@@ -229,15 +233,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
-}
-
-// 0 where the indices match and there is no interface, 1 from 1.15 on.
-float lf_presence(float eta) {
-    return 2.0 - 1.0;
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -248,22 +247,20 @@ vec3 lf_amount(Curve curve, float s) {
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float width2 = pow(max(pow(max(base, 1e-30), 1.41) + (pow(max(i.a, 1e-30), 1.41) + pow(max(o.a, 1e-30), 1.41)), 1e-30), 1.4184397);
-    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t = i.w.xyz + o.w.xyz;
-    float v = dot(t, t) / width2;
-    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
-}
-
-// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
-float lf_wider(float alpha, float coat_alpha) {
-    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
+    float t = i.a + o.a;
+    float shared_ = base * t / max(base + t, 1e-14);
+    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
+    vec3 t2 = i.w.xyz + o.w.xyz;
+    float v = dot(t2, t2);
+    return width2 / (3.1415927 * (width2 * width2 + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * width2 + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
-float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * dot(i.w.xyz, o.w.xyz);
-    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+float lf_ahead(Crossing i, Crossing o, float alpha) {
+    vec3 apart = i.air.xyz - o.air.xyz;
+    float back = 0.5 * (dot(apart, apart) + i.air.w * i.air.w + o.air.w * o.air.w);
+    return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
@@ -286,10 +283,11 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_glass.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_glass.eta * lf_glass.eta);
+    float there = lf_presence(lf_glass.eta);
     Shares shares = lf_split(crossing, crossing2, lf_silver.alpha);
-    float part = 0.2675 + 0.5116 * shares.base * shares.base;
-    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float part = 0.7911 * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_glass.tau);
@@ -299,12 +297,16 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec4 h = yi + yo;
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_silver.eta, lf_silver.k);
-    float rise = 1.0 + 0.468 * lf_presence(lf_glass.eta) * lf_glass.alpha * lf_glass.alpha * shares.base;
+    float rise = 1.0 + 0.3861 * there * lf_glass.alpha * lf_glass.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_glass_again, crossing.s) * lf_amount(lf_glass_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_silver.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_silver.alpha, lf_glass.alpha));
+    float shared_ = lf_silver.alpha * lf_silver.alpha / (lf_silver.alpha + lf_silver.alpha);
+    float t = sqrt(lf_silver.alpha * lf_silver.alpha + lf_silver.alpha * lf_silver.alpha + 3.173 * (shared_ * shared_));
+    float t2 = 0.4 * lf_glass.alpha;
+    shared_ = t * t2 / (t + t2);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_silver.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
     vec3 root = lf_amount(lf_glass_rest, crossing.s) * lf_amount(lf_glass_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_glass.eta, lf_silver.alpha);
-    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_silver.alpha) * lobes) + rest);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_silver.alpha);
+    vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_silver.alpha) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

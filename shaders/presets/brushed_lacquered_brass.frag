@@ -52,6 +52,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec3 air;     // direction above
 };
 
 struct Shares {
@@ -71,12 +72,12 @@ const Interface lf_lacquer_interface = Interface(
     0.009790741,                                                // gain: part of the reflected light that a second facet lets in
     vec4(-0.02416102, 0.037756085, -0.01229288, -0.008737861),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.015993359, -0.009139275),                            // passed_high: the other two, of higher powers
-    vec4(0.3210997, 0.02219797, -0.01847817, 0.013310194),      // bend: part by which the sine of light becomes smaller below
-    vec2(-0.005908057, 0.00022640824),                          // bend_high: 
-    vec4(0.75101304, -0.35615644, 0.2937088, -0.38354492),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.001817733, 0.06761384),                              // spread_high: 
-    vec4(1.0406462, -0.085528314, 0.08595249, -0.055620432),    // path: mean path over that of the refracted direction
-    vec2(-0.002415359, 0.018115044),                            // path_high: 
+    vec4(0.321479, 0.02150961, -0.017905116, 0.012897491),      // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0057248473, 0.00021928549),                         // bend_high: 
+    vec4(0.6033607, -0.2861347, 0.23596437, -0.30813918),       // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.0014604777, 0.054320663),                            // spread_high: 
+    vec4(1.0411197, -0.08653504, 0.08681801, -0.056460857),     // path: mean path over that of the refracted direction
+    vec2(-0.001490593, 0.017695904),                            // path_high: 
     vec4(0.08841845, -0.19763331, 0.23841499, -0.2506254),      // theta: scale of the path's distribution
     vec2(0.060514007, 0.080532625)                              // theta_high: 
 );
@@ -89,21 +90,21 @@ const Conductor lf_brass = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.41816452, 0.41162527, 0.40265685),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.014218695, -0.013605252, -0.014132589),   // c1: 
-    vec3(-0.0063857883, -0.007010661, -0.008479655),  // c2: 
-    vec3(0.010630757, 0.007878184, 0.00059580803),    // c3: 
-    vec3(-0.06879403, -0.06744358, -0.06682193),      // c4: 
-    vec3(-0.07393828, -0.070872664, -0.06618884)      // c5: 
+    vec3(0.42249942, 0.41596287, 0.40688264),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.014193058, -0.013624363, -0.014244258),  // c1: 
+    vec3(0.002750054, 0.001818344, -0.00038404018),  // c2: 
+    vec3(-0.013451546, -0.01593107, -0.022102058),   // c3: 
+    vec3(-0.07764311, -0.07594581, -0.07448354),     // c4: 
+    vec3(-0.057833552, -0.054947227, -0.0510875)     // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.8334882, 0.715165, 0.44966954),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.042363122, -0.03596078, -0.024968244),  // c1: 
-    vec3(0.02835232, 0.023965344, 0.013841599),     // c2: 
-    vec3(0.010354042, 0.0026351213, -0.007986486),  // c3: 
-    vec3(-0.13817763, -0.12176663, -0.082419276),   // c4: 
-    vec3(-0.119815946, -0.10085952, -0.06278241)    // c5: 
+    vec3(0.83247924, 0.71440005, 0.44934726),      // c0: coefficients of the powers of the curves' argument
+    vec3(-0.042790055, -0.0364106, -0.025350176),  // c1: 
+    vec3(0.025563061, 0.020827696, 0.011006594),   // c2: 
+    vec3(0.015206516, 0.0070174336, -0.0050053),   // c3: 
+    vec3(-0.1322161, -0.11567828, -0.07749823),    // c4: 
+    vec3(-0.12762225, -0.107916296, -0.06761423)   // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -147,7 +148,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec3(w.xy * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec3(w.xy * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -194,18 +195,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
+float lf_presence(float eta) {
+    return 2.0 - 1.0;
+}
+
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, vec2 alpha) {
-    vec2 base = pow(max(alpha * (i.w.z + o.w.z), 1e-30), vec2(1.41));
-    float first = pow(max(i.a, 1e-30), 1.41);
-    float second = pow(max(o.a, 1e-30), 1.41);
-    vec2 inverse = 1.0 / (base + first + second);
-    return Shares(base * inverse, first * inverse, second * inverse);
+    vec2 base = alpha * (i.w.z + o.w.z);
+    vec2 inverse = 1.0 / (base + i.a + o.a);
+    return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
 vec3 lf_lean(Crossing x, Crossing i, Crossing o, vec2 share) {
-    vec2 turn = 1.099 * share * (i.w.xy + o.w.xy);
+    vec2 turn = 0.8241 * share * (i.w.xy + o.w.xy);
     float z2 = x.w.z * x.w.z;
     z2 = max(z2 + dot(turn, 2.0 * x.w.xy - turn), min(z2, 0.0004));
     return vec3(x.w.xy - turn, sqrt(z2));
@@ -231,15 +235,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
-}
-
-// 0 where the indices match and there is no interface, 1 from 1.15 on.
-float lf_presence(float eta) {
-    return 2.0 - 1.0;
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -250,24 +249,22 @@ vec3 lf_amount(Curve curve, float s) {
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, vec2 alpha) {
     vec2 base = alpha * M;
-    vec2 width2 = pow(max(pow(max(base, 1e-30), vec2(1.41)) + (pow(max(i.a, 1e-30), 1.41) + pow(max(o.a, 1e-30), 1.41)), 1e-30), vec2(1.4184397));
+    float t = i.a + o.a;
+    vec2 shared_ = base * t / max(base + t, 1e-14);
+    vec2 width2 = base * base + t * t + 3.173 * (shared_ * shared_);
     float size = sqrt(width2.x * width2.y);
-    vec2 t = base * base + 0.3109 * (i.a * i.a + o.a * o.a);
-    float x = 0.2559 * (size / sqrt(t.x * t.y) - 1.0);
-    t = i.w.xy + o.w.xy;
-    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
-    return 1.0 / (3.1415927 * size * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
-}
-
-// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
-vec2 lf_wider(vec2 alpha, float coat_alpha) {
-    return pow(pow(alpha, vec2(1.41)) + pow(alpha, vec2(1.41)) + pow(0.9226 * coat_alpha, 1.41), vec2(0.7092199));
+    vec2 t2 = base * base + 0.8294 * (i.a * i.a + o.a * o.a);
+    float x = 0.3431 * (size / sqrt(t2.x * t2.y) - 1.0);
+    t2 = i.w.xy + o.w.xy;
+    float v = size * (t2.x * t2.x / width2.x + t2.y * t2.y / width2.y);
+    return size / (3.1415927 * (size * size + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * size + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
-float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * dot(i.w.xy, o.w.xy);
-    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+float lf_ahead(Crossing i, Crossing o, float alpha) {
+    vec2 apart = i.air.xy - o.air.xy;
+    float back = 0.5 * (dot(apart, apart) + i.air.z * i.air.z + o.air.z * o.air.z);
+    return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // NoW (1 + 2 Lambda) of the anisotropic GGX distribution (Heitz 2014, eqs. 72 and 80).
@@ -298,11 +295,12 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_lacquer.eta * lf_lacquer.eta);
     vec2 own = vec2(lf_brass.alpha_x, lf_brass.alpha_y);
+    float there = lf_presence(lf_lacquer.eta);
     Shares shares = lf_split(crossing, crossing2, own);
     float share = 0.5 * (shares.base.x + shares.base.y);
-    float part = 0.2675 + 0.5116 * share * share;
-    vec3 yi = lf_lean(crossing, crossing, crossing2, shares.i);
-    vec3 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float part = 0.7911 * share;
+    vec3 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    vec3 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_lacquer.tau);
@@ -312,12 +310,16 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     vec3 h = yi + yo;
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_brass.eta, lf_brass.k);
-    float rise = 1.0 + 0.468 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * share;
+    float rise = 1.0 + 0.3861 * there * lf_lacquer.alpha * lf_lacquer.alpha * share;
     vec3 again = F2 * (lf_amount(lf_lacquer_again, crossing.s) * lf_amount(lf_lacquer_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, lf_wider(own, lf_lacquer.alpha));
+    vec2 shared_ = own * own / (own + own);
+    vec2 t = sqrt(own * own + own * own + 3.173 * (shared_ * shared_));
+    float t2 = 0.4 * lf_lacquer.alpha;
+    shared_ = t * t2 / (t + t2);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, sqrt(0.5 * (lf_brass.alpha_x * lf_brass.alpha_x + lf_brass.alpha_y * lf_brass.alpha_y)));
-    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, sqrt(0.5 * (lf_brass.alpha_x * lf_brass.alpha_x + lf_brass.alpha_y * lf_brass.alpha_y)));
+    vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

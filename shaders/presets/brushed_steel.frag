@@ -37,7 +37,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + abs(p)));
     vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
@@ -77,7 +77,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float projection_i = lf_ggx_projection_anisotropic(wi, lf_steel.alpha_x, lf_steel.alpha_y);
     float projection_o = lf_ggx_projection_anisotropic(wo, lf_steel.alpha_x, lf_steel.alpha_y);
     float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    vec3 value = F * D * V;
+    vec3 value = F * (D * V);
     return lit ? value : vec3(0.0);
 }
 

@@ -38,6 +38,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_clear_coat = Coat(
@@ -50,12 +51,12 @@ const Interface lf_clear_coat_interface = Interface(
     0.0015962153,                                                // gain: part of the reflected light that a second facet lets in
     vec4(-0.00965715, 0.021873731, -0.0242624, 0.015375613),     // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0068878005, -0.010487776),                            // passed_high: the other two, of higher powers
-    vec4(0.3310786, 0.0042891726, -0.0013253987, 0.0006019473),  // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0068892688, 0.0055179894),                           // bend_high: 
-    vec4(0.72952676, -0.2272397, -0.12848555, -0.058554053),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.43840846, -0.38560963),                               // spread_high: 
-    vec4(1.009759, -0.020711035, 0.014585435, -0.017858267),     // path: mean path over that of the refracted direction
-    vec2(0.037453473, -0.023287058),                             // path_high: 
+    vec4(0.3311485, 0.004156165, -0.0012843013, 0.00058335066),  // bend: part by which the sine of light becomes smaller below
+    vec2(-0.00667572, 0.005346656),                              // bend_high: 
+    vec4(0.5860988, -0.18256347, -0.10322496, -0.047041982),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.3522155, -0.3097973),                                 // spread_high: 
+    vec4(1.0098422, -0.020885319, 0.0145971775, -0.017842293),   // path: mean path over that of the refracted direction
+    vec2(0.037828922, -0.023602962),                             // path_high: 
     vec4(0.019467048, -0.03448579, 0.0112755345, -0.07768409),   // theta: scale of the path's distribution
     vec2(0.13575086, -0.04182259)                                // theta_high: 
 );
@@ -107,7 +108,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -165,7 +166,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_clear_coat.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_clear_coat.eta * lf_clear_coat.eta);
-    vec3 value = F * D * V + throughput * (lf_paint.albedo / 3.1415927) / (1.0 - lf_paint.albedo * lf_paint_returned);
+    vec3 value = F * (D * V) + throughput * (lf_paint.albedo / 3.1415927) / (1.0 - lf_paint.albedo * lf_paint_returned);
     return lit ? value : vec3(0.0);
 }
 

@@ -246,7 +246,7 @@ float lf_with_second_facet(float T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec3 w, float scale, float alpha) {
     float one_minus = dot(w.xy, w.xy) / (1.0 + w.z);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -284,19 +284,6 @@ vec3 lf_steer(vec3 w, float lengthening) {
     return vec3(w.xy * ratio, z);
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
@@ -306,10 +293,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
@@ -347,7 +334,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float projection_i = lf_ggx_projection(wi, lf_candy.alpha);
     float projection_o = lf_ggx_projection(wo, lf_candy.alpha);
     float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_candy_interface, lf_candy, wi, wi);
     Crossing o = lf_cross(lf_candy_interface, lf_candy, wo, wo);
     float throughput = i.T * o.T / (lf_candy.eta * lf_candy.eta);
@@ -360,13 +347,13 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     vec3 directional = lf_transmittance(lf_candy.tau, straight + 0.5 * added);
     wi = lf_steer(i.w, 0.5 * i.drift);
     wo = lf_steer(o.w, 0.5 * o.drift);
-    vec3 h = lf_half_vector2(wi, wo);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(wi, wo), lf_flakes.eta, lf_flakes.k);
+    vec3 h = lf_half_vector(wi, wo);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_flakes.eta, lf_flakes.k);
     float R = 0.5 * (R_i + R_o);
     float t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
     float edge_i = lf_edge_reflection(sin_i, i.w.z, lf_candy_interface.n, t);
     float edge_o = lf_edge_reflection(sin_o, o.w.z, lf_candy_interface.n, t);
-    vec3 q = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
+    vec3 q = F2 * directional * (R + (1.0 - R) * (0.5 * (edge_i + edge_o)));
     float spread = (pow(i.spread, 1.5) + pow(o.spread, 1.5)) * pow(lf_candy.alpha, 1.5);
     float total = spread + 2.2795072 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
     total = total + 2.0 * pow(lf_candy.alpha, 1.5);
@@ -405,7 +392,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     projection_o = lf_beckmann_projection(wo, width);
     lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes = lobe + q * lobes;
-    vec3 f2 = f + throughput * directional * F2 * lobes;
+    vec3 f2 = f + throughput * (F2 * directional) * lobes;
     return lit ? f2 : vec3(0.0);
 }
 

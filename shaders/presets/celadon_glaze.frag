@@ -82,16 +82,16 @@ const Lambert lf_stoneware = Lambert(
 const Haze lf_glaze_haze = Haze(
     vec3(0.64, 0.34, 0.45999995),                     // reduced: optical depth, with light scattered forwards taken as not scattered
     vec3(0.72400004, 0.42400002, 0.54399997),         // between: the same, with light scattered forwards twice
-    vec3(0.0012118297, 0.0019125638, 0.0015111135),   // upper_upper: light that goes on to and fro and stays within the upper third
-    vec3(0.0007098455, 0.0013632263, 0.0009805667),   // upper_middle: that goes from the upper to the middle third, or back
-    vec3(0.00050186453, 0.0011000296, 0.000739269),   // upper_lower: from the upper to the lower third, or back
-    vec3(0.008195926, 0.016159065, 0.010613085),      // upper_base: from the upper third to the base, or back
-    vec3(0.0010183486, 0.0016630971, 0.001283429),    // middle_middle: within the middle third
-    vec3(0.0006751135, 0.0012710867, 0.00091004174),  // middle_lower: from the middle to the lower third, or back
-    vec3(0.009874072, 0.01734185, 0.011897618),       // middle_base: from the middle third to the base, or back
-    vec3(0.0010757897, 0.0016500414, 0.0012951212),   // lower_lower: within the lower third
-    vec3(0.013636091, 0.019728886, 0.0146145625),     // lower_base: from the lower third to the base, or back
-    vec3(1.0780619, 1.2055838, 1.1193447)             // returned: gain of the base by light that comes back to it
+    vec3(0.0012118295, 0.0019125632, 0.0015111133),   // upper_upper: light that goes on to and fro and stays within the upper third
+    vec3(0.00070984557, 0.0013632263, 0.0009805667),  // upper_middle: that goes from the upper to the middle third, or back
+    vec3(0.00050186453, 0.0011000294, 0.000739269),   // upper_lower: from the upper to the lower third, or back
+    vec3(0.0081959255, 0.01615906, 0.010613084),      // upper_base: from the upper third to the base, or back
+    vec3(0.0010183486, 0.0016630971, 0.0012834289),   // middle_middle: within the middle third
+    vec3(0.00067511346, 0.0012710866, 0.0009100417),  // middle_lower: from the middle to the lower third, or back
+    vec3(0.00987407, 0.017341847, 0.011897616),       // middle_base: from the middle third to the base, or back
+    vec3(0.0010757897, 0.0016500413, 0.001295121),    // lower_lower: within the lower third
+    vec3(0.013636089, 0.019728884, 0.01461456),       // lower_base: from the lower third to the base, or back
+    vec3(1.0780619, 1.2055838, 1.1193446)             // returned: gain of the base by light that comes back to it
 );
 
 // exp(x) - 1 without the cancellation near 0.
@@ -172,7 +172,7 @@ float lf_with_second_facet(float T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
     float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -249,7 +249,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_i = lf_ggx_projection(wi, lf_glaze.alpha);
     float projection_o = lf_ggx_projection(wo, lf_glaze.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_glaze_interface, lf_glaze, wi, wi);
     Crossing o = lf_cross(lf_glaze_interface, lf_glaze, wo, wo);
     float throughput = i.T * o.T / (lf_glaze.eta * lf_glaze.eta);

@@ -40,6 +40,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_sealer = Coat(
@@ -53,12 +54,12 @@ const Interface lf_sealer_interface = Interface(
     0.018790323,                                                // gain: part of the reflected light that a second facet lets in
     vec4(-0.030293863, 0.03411546, 0.007858283, -0.016438136),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0055495244, -0.0017564549),                          // passed_high: the other two, of higher powers
-    vec4(0.30218697, 0.038569808, -0.028244078, 0.0133236945),  // bend: part by which the sine of light becomes smaller below
-    vec2(0.0011662543, -0.0043652654),                          // bend_high: 
-    vec4(0.7569307, -0.4166647, 0.2770872, -0.21254128),        // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.11134212, 0.0695622),                               // spread_high: 
-    vec4(1.0665972, -0.13207108, 0.09955773, -0.031070113),     // path: mean path over that of the refracted direction
-    vec2(-0.021468341, 0.020035625),                            // path_high: 
+    vec4(0.30287337, 0.037373878, -0.027368307, 0.012910545),   // bend: part by which the sine of light becomes smaller below
+    vec2(0.0011300743, -0.004229963),                           // bend_high: 
+    vec4(0.60811496, -0.33474666, 0.22261092, -0.17075449),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.089451894, 0.05588582),                             // spread_high: 
+    vec4(1.0675288, -0.13411361, 0.10158929, -0.032689452),     // path: mean path over that of the refracted direction
+    vec2(-0.020755887, 0.020025134),                            // path_high: 
     vec4(0.15087932, -0.33279446, 0.3304903, -0.2277554),       // theta: scale of the path's distribution
     vec2(-0.014587497, 0.115838975)                             // theta_high: 
 );
@@ -124,7 +125,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -223,7 +224,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float throughput = crossing.T * crossing2.T / (lf_sealer.eta * lf_sealer.eta);
     vec3 once = lf_sealer.tau + (crossing.path - 1.0) * (2.0 * lf_sealer.tau / (1.0 + lf_spread_root(crossing.theta, lf_sealer.tau)));
     vec3 throughput2 = throughput * exp(-(once + (lf_sealer.tau + (crossing2.path - 1.0) * (2.0 * lf_sealer.tau / (1.0 + lf_spread_root(crossing2.theta, lf_sealer.tau))))));
-    vec3 value = F * D * V + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_concrete.albedo, lf_concrete.sigma) / (1.0 - lf_concrete.albedo * lf_concrete_returned);
+    vec3 value = F * (D * V) + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_concrete.albedo, lf_concrete.sigma) / (1.0 - lf_concrete.albedo * lf_concrete_returned);
     return lit ? value : vec3(0.0);
 }
 

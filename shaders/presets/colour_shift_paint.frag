@@ -140,7 +140,7 @@ float lf_with_second_facet(float T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
     float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -173,22 +173,9 @@ vec4 lf_steer(vec4 w, float lengthening) {
     return vec4(w.xyz * ratio, z);
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
 float lf_chebyshev_argument(float c) {
-    return (2.0 * sqrt(c) - 1.06) / 0.94;
+    return max((2.0 * sqrt(c) - 1.06) / 0.94, -1.0);
 }
 
 // What Schlick's formula takes for f0 of a metal with a film, in daylight.
@@ -218,11 +205,6 @@ float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
     return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
-}
-
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
     bool lit = min(wi.w, wo.w) > 0.0;
@@ -231,7 +213,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_i = lf_ggx_projection(wi, lf_clear_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_clear_coat.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_clear_coat_interface, lf_clear_coat, wi, wi);
     Crossing o = lf_cross(lf_clear_coat_interface, lf_clear_coat, wo, wo);
     float throughput = i.T * o.T / (lf_clear_coat.eta * lf_clear_coat.eta);
@@ -241,8 +223,8 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float R_o = 1.0 - o.T;
     wi = lf_steer(i.w, 0.5 * i.drift);
     wo = lf_steer(o.w, 0.5 * o.drift);
-    vec4 h = lf_half_vector2(wi, wo);
-    float t = lf_half_cosine2(wi, wo);
+    vec4 h = lf_half_vector(wi, wo);
+    float t = lf_half_cosine(wi, wo);
     vec3 reflected = lf_fresnel_schlick(t, lf_film_on_metal(lf_pigment, t));
     vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
     vec3 F2 = min(max(reflected, 0.0), 1.0) + 0.0025 * (below * below);
@@ -257,7 +239,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total = spread + 2.0 * pow(lf_pigment.alpha, 1.34);
@@ -266,7 +248,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     total = spread + pow(lf_pigment.alpha, 1.34);
@@ -274,7 +256,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * F2 * lobes;

@@ -40,6 +40,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_shellac = Coat(
@@ -49,18 +50,18 @@ const Coat lf_shellac = Coat(
 );
 
 const Interface lf_shellac_interface = Interface(
-    0.0031546694,                                                  // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.009618692, 0.021733595, -0.024097253, 0.0152621865),   // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.0068437173, -0.0104005365),                             // passed_high: the other two, of higher powers
-    vec4(0.33981726, 0.0043400154, -0.0013305843, 0.00059890747),  // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0069757253, 0.005593419),                              // bend_high: 
-    vec4(0.7398473, -0.22701198, -0.12849008, -0.05826497),        // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.44370586, -0.39202416),                                 // spread_high: 
-    vec4(1.0097235, -0.020541668, 0.014399797, -0.017714024),      // path: mean path over that of the refracted direction
-    vec2(0.0373798, -0.023298264),                                 // path_high: 
-    vec4(0.019935852, -0.035078302, 0.011336705, -0.08009496),     // theta: scale of the path's distribution
-    vec2(0.13903353, -0.042160243)                                 // theta_high: 
+    0.0031546694,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.009618692, 0.021733595, -0.024097253, 0.0152621865),  // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.0068437173, -0.0104005365),                            // passed_high: the other two, of higher powers
+    vec4(0.3398882, 0.0042054877, -0.0012893379, 0.0005802512),   // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0067593604, 0.0054201186),                            // bend_high: 
+    vec4(0.5943904, -0.18238035, -0.103228435, -0.04681036),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.35647148, -0.31495014),                                // spread_high: 
+    vec4(1.0098053, -0.02071166, 0.014411002, -0.017700434),      // path: mean path over that of the refracted direction
+    vec2(0.037746668, -0.023606777),                              // path_high: 
+    vec4(0.019935852, -0.035078302, 0.011336705, -0.08009496),    // theta: scale of the path's distribution
+    vec2(0.13903353, -0.042160243)                                // theta_high: 
 );
 
 const OrenNayar lf_mahogany = OrenNayar(
@@ -124,7 +125,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -223,7 +224,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float throughput = crossing.T * crossing2.T / (lf_shellac.eta * lf_shellac.eta);
     vec3 once = lf_shellac.tau + (crossing.path - 1.0) * (2.0 * lf_shellac.tau / (1.0 + lf_spread_root(crossing.theta, lf_shellac.tau)));
     vec3 throughput2 = throughput * exp(-(once + (lf_shellac.tau + (crossing2.path - 1.0) * (2.0 * lf_shellac.tau / (1.0 + lf_spread_root(crossing2.theta, lf_shellac.tau))))));
-    vec3 value = F * D * V + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_mahogany.albedo, lf_mahogany.sigma) / (1.0 - lf_mahogany.albedo * lf_mahogany_returned);
+    vec3 value = F * (D * V) + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_mahogany.albedo, lf_mahogany.sigma) / (1.0 - lf_mahogany.albedo * lf_mahogany_returned);
     return lit ? value : vec3(0.0);
 }
 

@@ -51,6 +51,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 struct Shares {
@@ -70,12 +71,12 @@ const Interface lf_lacquer_interface = Interface(
     0.051016223,                                                // gain: part of the reflected light that a second facet lets in
     vec4(-0.037516396, 0.012820616, 0.028922228, 0.005808585),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.008892238, -0.004150729),                           // passed_high: the other two, of higher powers
-    vec4(0.27862754, 0.07801179, -0.025750428, -0.007510811),   // bend: part by which the sine of light becomes smaller below
-    vec2(0.006303534, -0.001227349),                            // bend_high: 
-    vec4(0.7690234, -0.39006528, 0.056888446, 0.061820567),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.08834498, -0.038719773),                            // spread_high: 
-    vec4(1.1297681, -0.20916533, 0.06399265, 0.041727304),      // path: mean path over that of the refracted direction
-    vec2(-0.020675898, -0.0021611452),                          // path_high: 
+    vec4(0.2803238, 0.07559285, -0.024951816, -0.0072780848),   // bend: part by which the sine of light becomes smaller below
+    vec2(0.006108001, -0.0011891425),                           // bend_high: 
+    vec4(0.6178303, -0.31337678, 0.045703977, 0.049666166),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.07097575, -0.031107336),                            // spread_high: 
+    vec4(1.1324444, -0.21489698, 0.0686833, 0.039824724),       // path: mean path over that of the refracted direction
+    vec2(-0.021069527, -0.0014952421),                          // path_high: 
     vec4(0.3402057, -0.6483584, 0.3542442, -0.015058003),       // theta: scale of the path's distribution
     vec2(-0.08199707, 0.081555456)                              // theta_high: 
 );
@@ -87,21 +88,21 @@ const Conductor lf_copper = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.46140078, 0.35617423, 0.18159638),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.04897762, -0.02723708, -0.0058065653),  // c1: 
-    vec3(0.006208852, 0.0050466657, 0.003789235),   // c2: 
-    vec3(0.05291173, 0.036968768, 0.022788197),     // c3: 
-    vec3(-0.11507855, -0.08804251, -0.042115636),   // c4: 
-    vec3(-0.11942315, -0.09002751, -0.046424523)    // c5: 
+    vec3(0.4570671, 0.35456714, 0.1823068),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.063961364, -0.039953694, -0.013034489),  // c1: 
+    vec3(0.022261433, 0.015880272, 0.008814409),     // c2: 
+    vec3(0.046931833, 0.0332475, 0.02166535),        // c3: 
+    vec3(-0.121284574, -0.09275403, -0.04560338),    // c4: 
+    vec3(-0.11538395, -0.08750728, -0.046186805)     // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.779007, 0.4504561, 0.2588784),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0783916, -0.04389602, -0.023447432),   // c1: 
-    vec3(0.02200608, 0.018041283, 0.019702472),    // c2: 
-    vec3(0.062012613, 0.039598256, 0.045997202),   // c3: 
-    vec3(-0.14751038, -0.09855473, -0.072386235),  // c4: 
-    vec3(-0.14874923, -0.09715325, -0.081057236)   // c5: 
+    vec3(0.7820462, 0.45333117, 0.26108205),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.083143175, -0.04643941, -0.025496434),  // c1: 
+    vec3(0.020463139, 0.014473073, 0.018237077),    // c2: 
+    vec3(0.06437695, 0.038382143, 0.046581924),     // c3: 
+    vec3(-0.14681754, -0.095737025, -0.07114426),   // c4: 
+    vec3(-0.15313566, -0.097661614, -0.083030045)   // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -145,7 +146,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -192,18 +193,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
+float lf_presence(float eta) {
+    return 2.0 - 1.0;
+}
+
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
-    float first = pow(i.a, 1.41);
-    float second = pow(o.a, 1.41);
-    float inverse = 1.0 / (base + first + second);
-    return Shares(base * inverse, first * inverse, second * inverse);
+    float base = alpha * (i.w.w + o.w.w);
+    float inverse = 1.0 / (base + i.a + o.a);
+    return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
 vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
-    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    vec3 turn = 0.8241 * share * (i.w.xyz + o.w.xyz);
     float z2 = x.w.w * x.w.w;
     z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
     return vec4(x.w.xyz - turn, sqrt(z2));
@@ -229,15 +233,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
-}
-
-// 0 where the indices match and there is no interface, 1 from 1.15 on.
-float lf_presence(float eta) {
-    return 2.0 - 1.0;
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -248,22 +247,20 @@ vec3 lf_amount(Curve curve, float s) {
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float width2 = pow(pow(max(base, 1e-30), 1.41) + (pow(i.a, 1.41) + pow(o.a, 1.41)), 1.4184397);
-    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t = i.w.xyz + o.w.xyz;
-    float v = dot(t, t) / width2;
-    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
-}
-
-// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
-float lf_wider(float alpha, float coat_alpha) {
-    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
+    float t = i.a + o.a;
+    float shared_ = base * t / (base + t);
+    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
+    vec3 t2 = i.w.xyz + o.w.xyz;
+    float v = dot(t2, t2);
+    return width2 / (3.1415927 * (width2 * width2 + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * width2 + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
-float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * dot(i.w.xyz, o.w.xyz);
-    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+float lf_ahead(Crossing i, Crossing o, float alpha) {
+    vec3 apart = i.air.xyz - o.air.xyz;
+    float back = 0.5 * (dot(apart, apart) + i.air.w * i.air.w + o.air.w * o.air.w);
+    return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
@@ -286,10 +283,11 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_lacquer.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_lacquer.eta * lf_lacquer.eta);
+    float there = lf_presence(lf_lacquer.eta);
     Shares shares = lf_split(crossing, crossing2, lf_copper.alpha);
-    float part = 0.2675 + 0.5116 * shares.base * shares.base;
-    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float part = 0.7911 * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_lacquer.tau);
@@ -299,12 +297,16 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec4 h = yi + yo;
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_copper.eta, lf_copper.k);
-    float rise = 1.0 + 0.468 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * shares.base;
+    float rise = 1.0 + 0.3861 * there * lf_lacquer.alpha * lf_lacquer.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_lacquer_again, crossing.s) * lf_amount(lf_lacquer_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_copper.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_copper.alpha, lf_lacquer.alpha));
+    float shared_ = lf_copper.alpha * lf_copper.alpha / (lf_copper.alpha + lf_copper.alpha);
+    float t = sqrt(lf_copper.alpha * lf_copper.alpha + lf_copper.alpha * lf_copper.alpha + 3.173 * (shared_ * shared_));
+    float t2 = 0.4 * lf_lacquer.alpha;
+    shared_ = t * t2 / (t + t2);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_copper.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, lf_copper.alpha);
-    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_copper.alpha) * lobes) + rest);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_copper.alpha);
+    vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_copper.alpha) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

@@ -39,6 +39,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_lacquer = Coat(
@@ -51,12 +52,12 @@ const Interface lf_lacquer_interface = Interface(
     0.11758662,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.051513065, 0.0059220353, 0.011182629, 0.04249962),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0011268947, -0.016593136),                           // passed_high: the other two, of higher powers
-    vec4(0.22668222, 0.10366632, 0.013775408, -0.020391881),    // bend: part by which the sine of light becomes smaller below
-    vec2(-0.006608844, 0.0025399923),                           // bend_high: 
-    vec4(0.67365825, -0.17226803, -0.10509278, 0.01729983),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.011321053, -0.033619165),                           // spread_high: 
-    vec4(1.2000802, -0.2399407, -0.020672172, 0.0676136),       // path: mean path over that of the refracted direction
-    vec2(0.011690021, -0.01059103),                             // path_high: 
+    vec4(0.22998923, 0.10045182, 0.013348281, -0.019759566),    // bend: part by which the sine of light becomes smaller below
+    vec2(-0.006403923, 0.0024611354),                           // bend_high: 
+    vec4(0.5412143, -0.1383994, -0.084431216, 0.013898551),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.009095132, -0.027009755),                           // spread_high: 
+    vec4(1.2071077, -0.25323558, -0.014452308, 0.06881237),     // path: mean path over that of the refracted direction
+    vec2(0.010520339, -0.010583401),                            // path_high: 
     vec4(0.59302557, -0.9069695, 0.14514132, 0.23783478),       // theta: scale of the path's distribution
     vec2(-0.018604606, -0.007173978)                            // theta_high: 
 );
@@ -122,7 +123,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -214,7 +215,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_lacquer.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_lacquer.eta * lf_lacquer.eta);
-    vec3 value = F * D * V + throughput * lf_oren_nayar_full(crossing.w, crossing2.w, lf_oak.albedo, lf_oak.sigma) / (1.0 - lf_oak.albedo * lf_oak_returned);
+    vec3 value = F * (D * V) + throughput * lf_oren_nayar_full(crossing.w, crossing2.w, lf_oak.albedo, lf_oak.sigma) / (1.0 - lf_oak.albedo * lf_oak_returned);
     return lit ? value : vec3(0.0);
 }
 

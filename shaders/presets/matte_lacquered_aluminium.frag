@@ -51,6 +51,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 struct Shares {
@@ -70,12 +71,12 @@ const Interface lf_lacquer_interface = Interface(
     0.23253432,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.117580555, 0.06625485, -0.008904142, 0.026615268),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.019321598, -0.003716942),                            // passed_high: the other two, of higher powers
-    vec4(0.16015665, 0.08384476, 0.050894096, 0.018529266),     // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0102761835, -0.010899454),                          // bend_high: 
-    vec4(0.47685713, 0.016207732, -0.037082642, -0.043587685),  // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.036313757, -0.016467094),                           // spread_high: 
-    vec4(1.2581091, -0.23291022, -0.06929174, 0.04006815),      // path: mean path over that of the refracted direction
-    vec2(0.022292495, 9.179115e-06),                            // path_high: 
+    vec4(0.16552648, 0.0812449, 0.04931599, 0.017954648),       // bend: part by which the sine of light becomes smaller below
+    vec2(-0.009957552, -0.010561466),                           // bend_high: 
+    vec4(0.3831051, 0.013021208, -0.029791906, -0.035018355),   // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.029174253, -0.0132294595),                          // spread_high: 
+    vec4(1.2751803, -0.25845492, -0.06610456, 0.045912266),     // path: mean path over that of the refracted direction
+    vec2(0.022619247, -0.0008739233),                           // path_high: 
     vec4(0.86954325, -1.0685096, -0.09935013, 0.33906257),      // theta: scale of the path's distribution
     vec2(0.066010416, -0.044408634)                             // theta_high: 
 );
@@ -87,21 +88,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.5786731, 0.5761039, 0.5669507),            // c0: coefficients of the powers of the curves' argument
-    vec3(0.01003807, 0.010405466, 0.013401136),       // c1: 
-    vec3(-0.020763643, -0.020173281, -0.017816842),   // c2: 
-    vec3(-0.0059741437, -0.007120937, -0.011303633),  // c3: 
-    vec3(-0.14492314, -0.144252, -0.14286658),        // c4: 
-    vec3(-0.13510427, -0.13359776, -0.1289601)        // c5: 
+    vec3(0.5982471, 0.5957608, 0.5869738),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.059255935, -0.058735937, -0.054995112),  // c1: 
+    vec3(-0.064245865, -0.06397284, -0.06301296),    // c2: 
+    vec3(-0.030506283, -0.031115592, -0.034228295),  // c3: 
+    vec3(-0.11314517, -0.11236209, -0.11036451),     // c4: 
+    vec3(-0.09669924, -0.095636606, -0.092007935)    // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.75087786, 0.7406517, 0.73172146),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.057133973, -0.05617909, -0.052613795),     // c1: 
-    vec3(-0.0044632405, -0.004872054, -0.0046806484),  // c2: 
-    vec3(0.06858915, 0.06518227, 0.057091296),         // c3: 
-    vec3(-0.14187452, -0.13935739, -0.13723531),       // c4: 
-    vec3(-0.17183894, -0.16760176, -0.16063243)        // c5: 
+    vec3(0.7571852, 0.7470394, 0.73860687),            // c0: coefficients of the powers of the curves' argument
+    vec3(-0.06868847, -0.06793345, -0.06493266),       // c1: 
+    vec3(0.0015773773, 0.00059761107, -0.0011479706),  // c2: 
+    vec3(0.07874924, 0.07603103, 0.06974149),          // c3: 
+    vec3(-0.15356559, -0.15057865, -0.14713502),       // c4: 
+    vec3(-0.1838063, -0.17983323, -0.17371714)         // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -145,7 +146,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -192,18 +193,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
+float lf_presence(float eta) {
+    return 2.0 - 1.0;
+}
+
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
-    float first = pow(i.a, 1.41);
-    float second = pow(o.a, 1.41);
-    float inverse = 1.0 / (base + first + second);
-    return Shares(base * inverse, first * inverse, second * inverse);
+    float base = alpha * (i.w.w + o.w.w);
+    float inverse = 1.0 / (base + i.a + o.a);
+    return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
 vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
-    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    vec3 turn = 0.8241 * share * (i.w.xyz + o.w.xyz);
     float z2 = x.w.w * x.w.w;
     z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
     return vec4(x.w.xyz - turn, sqrt(z2));
@@ -229,15 +233,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
-}
-
-// 0 where the indices match and there is no interface, 1 from 1.15 on.
-float lf_presence(float eta) {
-    return 2.0 - 1.0;
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -248,22 +247,20 @@ vec3 lf_amount(Curve curve, float s) {
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float width2 = pow(pow(max(base, 1e-30), 1.41) + (pow(i.a, 1.41) + pow(o.a, 1.41)), 1.4184397);
-    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t = i.w.xyz + o.w.xyz;
-    float v = dot(t, t) / width2;
-    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
-}
-
-// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
-float lf_wider(float alpha, float coat_alpha) {
-    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
+    float t = i.a + o.a;
+    float shared_ = base * t / (base + t);
+    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
+    vec3 t2 = i.w.xyz + o.w.xyz;
+    float v = dot(t2, t2);
+    return width2 / (3.1415927 * (width2 * width2 + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * width2 + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
-float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * dot(i.w.xyz, o.w.xyz);
-    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+float lf_ahead(Crossing i, Crossing o, float alpha) {
+    vec3 apart = i.air.xyz - o.air.xyz;
+    float back = 0.5 * (dot(apart, apart) + i.air.w * i.air.w + o.air.w * o.air.w);
+    return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
@@ -286,10 +283,11 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_lacquer.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_lacquer.eta * lf_lacquer.eta);
+    float there = lf_presence(lf_lacquer.eta);
     Shares shares = lf_split(crossing, crossing2, lf_aluminium.alpha);
-    float part = 0.2675 + 0.5116 * shares.base * shares.base;
-    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float part = 0.7911 * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_lacquer.tau);
@@ -299,12 +297,16 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec4 h = yi + yo;
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
-    float rise = 1.0 + 0.468 * lf_presence(lf_lacquer.eta) * lf_lacquer.alpha * lf_lacquer.alpha * shares.base;
+    float rise = 1.0 + 0.3861 * there * lf_lacquer.alpha * lf_lacquer.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_lacquer_again, crossing.s) * lf_amount(lf_lacquer_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_lacquer.alpha));
+    float shared_ = lf_aluminium.alpha * lf_aluminium.alpha / (lf_aluminium.alpha + lf_aluminium.alpha);
+    float t = sqrt(lf_aluminium.alpha * lf_aluminium.alpha + lf_aluminium.alpha * lf_aluminium.alpha + 3.173 * (shared_ * shared_));
+    float t2 = 0.4 * lf_lacquer.alpha;
+    shared_ = t * t2 / (t + t2);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_lacquer.eta, lf_aluminium.alpha);
-    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_aluminium.alpha);
+    vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

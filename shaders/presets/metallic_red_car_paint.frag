@@ -273,7 +273,7 @@ float lf_with_second_facet(float T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec3 w, float scale, float alpha) {
     float one_minus = dot(w.xy, w.xy) / (1.0 + w.z);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -306,19 +306,6 @@ vec3 lf_steer(vec3 w, float lengthening) {
     return vec3(w.xy * ratio, z);
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric2(float c, float eta) {
     return 0.0;
@@ -328,11 +315,6 @@ float lf_fresnel_dielectric2(float c, float eta) {
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
     float m = 0.5 * (1.0 - sine) / (n * cosine);
     return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
-}
-
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -354,6 +336,19 @@ vec3 lf_transmittance(vec3 tau, float path) {
     return exp(-(tau * path));
 }
 
+// The unit vector halfway between two directions on the same side of the surface.
+vec3 lf_half_vector2(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    return s * inversesqrt(dot(s, s));
+}
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine2(vec3 wi, vec3 wo) {
+    vec3 s = wi + wo;
+    float s2 = dot(s, s);
+    return min(0.5 * sqrt(s2), 1.0);
+}
+
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
@@ -363,7 +358,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
@@ -395,7 +390,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float projection_i = lf_ggx_projection(wi, lf_clear_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_clear_coat.alpha);
     float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_clear_coat_interface, lf_clear_coat, wi, wi);
     Crossing o = lf_cross(lf_clear_coat_interface, lf_clear_coat, wo, wo);
     float throughput = i.T * o.T / (lf_clear_coat.eta * lf_clear_coat.eta);
@@ -405,8 +400,8 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float R_o = 1.0 - o.T;
     vec3 wi2 = lf_steer(i.w, 0.5 * i.drift);
     vec3 wo2 = lf_steer(o.w, 0.5 * o.drift);
-    vec3 h = lf_half_vector2(wi2, wo2);
-    F = lf_fresnel_dielectric2(lf_half_cosine2(wi2, wo2), lf_colour.eta);
+    vec3 h = lf_half_vector(wi2, wo2);
+    F = lf_fresnel_dielectric2(lf_half_cosine(wi2, wo2), lf_colour.eta);
     float R = 0.5 * (R_i + R_o);
     float edge_i = lf_edge_reflection(sin_i, i.w.z, lf_clear_coat_interface.n, lf_colour.alpha);
     float edge_o = lf_edge_reflection(sin_o, o.w.z, lf_clear_coat_interface.n, lf_colour.alpha);
@@ -418,7 +413,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.z, wo2.z, projection_i, projection_o);
+    V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
     float lobe = D * V;
     float lobes = lobe / (1.0 - q);
     total = spread + 2.0 * pow(lf_colour.alpha, 1.34);
@@ -427,7 +422,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.z, wo2.z, projection_i, projection_o);
+    V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     total = spread + pow(lf_colour.alpha, 1.34);
@@ -435,7 +430,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.z, wo2.z, projection_i, projection_o);
+    V = lf_v_smith(wi2.z, wo2.z, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     f = f + throughput * F * lobes;
@@ -460,7 +455,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
     edge_i = lf_edge_reflection(sin_i, i2.w.z, lf_colour_interface.n, t);
     edge_o = lf_edge_reflection(sin_o, o2.w.z, lf_colour_interface.n, t);
-    vec3 q2 = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
+    vec3 q2 = F2 * directional * (R + (1.0 - R) * (0.5 * (edge_i + edge_o)));
     spread = (pow(i.spread, 1.5) + pow(o.spread, 1.5)) * pow(lf_clear_coat.alpha, 1.5);
     spread = spread + (pow(1e-30, 1.5) + pow(1e-30, 1.5)) * pow(lf_colour.alpha, 1.5);
     total = spread + 2.2795072 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
@@ -500,7 +495,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     projection_o = lf_beckmann_projection(wo, width);
     lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes2 = lobe + q2 * lobes2;
-    vec3 f2 = f + throughput * directional * F2 * lobes2;
+    vec3 f2 = f + throughput * (F2 * directional) * lobes2;
     vec3 albedo = (1.0 - lf_flakes.coverage) * lf_flakes.albedo;
     vec3 reflected = albedo / 3.1415927 * lf_flakes_returned;
     reflected = reflected * (1.0 / (1.0 - lf_flakes_lobes * R_i * lf_transmittance(lf_colour.tau, 2.0 / i2.w.z)));

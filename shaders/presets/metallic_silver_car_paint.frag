@@ -68,7 +68,7 @@ const Flakes lf_flakes = Flakes(
     0.0                                  // seed: whole number; another one, other flakes
 );
 
-const vec3 lf_flakes_returned = vec3(1.0466825, 1.0504646, 1.0541661);
+const vec3 lf_flakes_returned = vec3(1.0466825, 1.0504646, 1.054166);
 
 const vec3 lf_flakes_lobes = vec3(0.69331604, 0.70364136, 0.712017);
 
@@ -252,7 +252,7 @@ float lf_with_second_facet(float T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec3 w, float scale, float alpha) {
     float one_minus = dot(w.xy, w.xy) / (1.0 + w.z);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -285,19 +285,6 @@ vec3 lf_steer(vec3 w, float lengthening) {
     return vec3(w.xy * ratio, z);
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
@@ -307,10 +294,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
@@ -348,7 +335,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float projection_i = lf_ggx_projection(wi, lf_clear_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_clear_coat.alpha);
     float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_clear_coat_interface, lf_clear_coat, wi, wi);
     Crossing o = lf_cross(lf_clear_coat_interface, lf_clear_coat, wo, wo);
     float throughput = i.T * o.T / (lf_clear_coat.eta * lf_clear_coat.eta);
@@ -358,8 +345,8 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float R_o = 1.0 - o.T;
     wi = lf_steer(i.w, 0.5 * i.drift);
     wo = lf_steer(o.w, 0.5 * o.drift);
-    vec3 h = lf_half_vector2(wi, wo);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(wi, wo), lf_flakes.eta, lf_flakes.k);
+    vec3 h = lf_half_vector(wi, wo);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_flakes.eta, lf_flakes.k);
     F2 = lf_flakes.coverage * F2;
     float R = 0.5 * (R_i + R_o);
     float t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);

@@ -182,7 +182,7 @@ vec3 lf_with_second_facet(vec3 T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
     float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -254,7 +254,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_i = lf_ggx_projection(wi, lf_water.alpha);
     float projection_o = lf_ggx_projection(wo, lf_water.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    vec3 f = F * D * V;
+    vec3 f = F * (D * V);
     Crossing i = lf_cross(lf_water_interface, lf_water, wi, wi);
     Crossing o = lf_cross(lf_water_interface, lf_water, wo, wo);
     vec3 throughput = i.T * o.T / (lf_water.eta * lf_water.eta);

@@ -40,6 +40,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_oil = Coat(
@@ -49,18 +50,18 @@ const Coat lf_oil = Coat(
 );
 
 const Interface lf_oil_interface = Interface(
-    0.07902597,                                                  // tilt: turn of the mean facet towards a grazing direction
-    0.21274194,                                                  // gain: part of the reflected light that a second facet lets in
-    vec4(-0.102022186, 0.05346267, -0.00935491, 0.032929197),    // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.017657153, -0.007665964),                             // passed_high: the other two, of higher powers
-    vec4(0.16476789, 0.08823583, 0.04829134, 0.011239201),       // bend: part by which the sine of light becomes smaller below
-    vec2(-0.012479812, -0.0093691945),                           // bend_high: 
-    vec4(0.49851844, 0.0006311983, -0.054577872, -0.049606323),  // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.030749634, -0.01205802),                             // spread_high: 
-    vec4(1.2460318, -0.23140419, -0.06487888, 0.042119026),      // path: mean path over that of the refracted direction
-    vec2(0.02292329, 0.00061380863),                             // path_high: 
-    vec4(0.8084004, -1.0369201, -0.056403957, 0.32752085),       // theta: scale of the path's distribution
-    vec2(0.052598123, -0.038988426)                              // theta_high: 
+    0.07902597,                                                 // tilt: turn of the mean facet towards a grazing direction
+    0.21274194,                                                 // gain: part of the reflected light that a second facet lets in
+    vec4(-0.102022186, 0.05346267, -0.00935491, 0.032929197),   // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.017657153, -0.007665964),                            // passed_high: the other two, of higher powers
+    vec4(0.16971537, 0.0854998, 0.046793997, 0.0108908415),     // bend: part by which the sine of light becomes smaller below
+    vec2(-0.012092873, -0.00907886),                            // bend_high: 
+    vec4(0.40050766, 0.0005070567, -0.04384765, -0.039853424),  // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.024704203, -0.009687424),                           // spread_high: 
+    vec4(1.2611977, -0.25521743, -0.060661018, 0.047566414),    // path: mean path over that of the refracted direction
+    vec2(0.022820175, -0.0003055334),                           // path_high: 
+    vec4(0.8084004, -1.0369201, -0.056403957, 0.32752085),      // theta: scale of the path's distribution
+    vec2(0.052598123, -0.038988426)                             // theta_high: 
 );
 
 const OrenNayar lf_walnut = OrenNayar(
@@ -119,12 +120,12 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
-    float bend = max(lf_curve(interface_.bend, interface_.bend_high, s), 0.0);
+    float bend = lf_curve(interface_.bend, interface_.bend_high, s);
     float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -223,7 +224,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float throughput = crossing.T * crossing2.T / (lf_oil.eta * lf_oil.eta);
     vec3 once = lf_oil.tau + (crossing.path - 1.0) * (2.0 * lf_oil.tau / (1.0 + lf_spread_root(crossing.theta, lf_oil.tau)));
     vec3 throughput2 = throughput * exp(-(once + (lf_oil.tau + (crossing2.path - 1.0) * (2.0 * lf_oil.tau / (1.0 + lf_spread_root(crossing2.theta, lf_oil.tau))))));
-    vec3 value = F * D * V + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_walnut.albedo, lf_walnut.sigma) / (1.0 - lf_walnut.albedo * lf_walnut_returned);
+    vec3 value = F * (D * V) + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_walnut.albedo, lf_walnut.sigma) / (1.0 - lf_walnut.albedo * lf_walnut_returned);
     return lit ? value : vec3(0.0);
 }
 

@@ -169,7 +169,7 @@ float lf_with_second_facet(float T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
     float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -202,19 +202,6 @@ vec4 lf_steer(vec4 w, float lengthening) {
     return vec4(w.xyz * ratio, z);
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.
 float lf_rarer_cosine(float c, float eta) {
     return c;
@@ -222,7 +209,7 @@ float lf_rarer_cosine(float c, float eta) {
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
 float lf_chebyshev_argument(float c) {
-    return (2.0 * sqrt(c) - 1.06) / 0.94;
+    return max((2.0 * sqrt(c) - 1.06) / 0.94, -1.0);
 }
 
 // What Schlick's formula takes for f0 of a coat with a film, in daylight; `c` on the rarer side.
@@ -252,9 +239,23 @@ float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
     return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+// sqrt(c) as -1 to 1, from where a film's polynomial begins.
+float lf_chebyshev_argument2(float c) {
+    return (2.0 * sqrt(c) - 1.06) / 0.94;
+}
+
+// What Schlick's formula takes for f0 of a coat with a film, in daylight; `c` on the rarer side.
+vec3 lf_film_on_coat2(Coat2 coat, float c) {
+    float s = lf_chebyshev_argument2(c);
+    vec3 total = coat.film_8 + 2.0 * s * coat.film_9;
+    vec3 total2 = coat.film_7 + 2.0 * s * total - coat.film_9;
+    total = coat.film_6 + 2.0 * s * total2 - total;
+    total2 = coat.film_5 + 2.0 * s * total - total2;
+    total = coat.film_4 + 2.0 * s * total2 - total;
+    total2 = coat.film_3 + 2.0 * s * total - total2;
+    total = coat.film_2 + 2.0 * s * total2 - total;
+    total2 = coat.film_1 + 2.0 * s * total - total2;
+    return coat.film_0 + s * total2 - total;
 }
 
 // Energy that passes a rough interface, from what passes the mean facet; `gain` is `second_facet`.
@@ -265,7 +266,7 @@ vec3 lf_with_second_facet(vec3 T, float gain) {
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
 Crossing2 lf_cross(Interface interface_, Coat2 coat, vec4 w, vec4 air) {
     float c = lf_facet_cosine(w, interface_.tilt);
-    vec3 t = lf_film_on_coat(coat, c);
+    vec3 t = lf_film_on_coat2(coat, c);
     vec3 below = 1.0 - min(max(lf_fresnel_schlick(c, t) * 200.0, 0.0), 1.0);
     vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c * (5.0 - c * (10.0 - c * (10.0 - c * (5.0 - c))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
@@ -281,7 +282,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_i = lf_ggx_projection(wi, lf_clear_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_clear_coat.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_clear_coat_interface, lf_clear_coat, wi, wi);
     Crossing o = lf_cross(lf_clear_coat_interface, lf_clear_coat, wo, wo);
     float throughput = i.T * o.T / (lf_clear_coat.eta * lf_clear_coat.eta);
@@ -291,8 +292,8 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float R_o = 1.0 - o.T;
     vec4 wi2 = lf_steer(i.w, 0.5 * i.drift);
     vec4 wo2 = lf_steer(o.w, 0.5 * o.drift);
-    vec4 h = lf_half_vector2(wi2, wo2);
-    float c = lf_rarer_cosine(lf_half_cosine2(wi2, wo2), lf_pearl.eta);
+    vec4 h = lf_half_vector(wi2, wo2);
+    float c = lf_rarer_cosine(lf_half_cosine(wi2, wo2), lf_pearl.eta);
     vec3 reflected = lf_fresnel_schlick(c, lf_film_on_coat(lf_pearl, c));
     vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
     vec3 F2 = min(max(reflected, 0.0), 1.0) + 0.0025 * (below * below);
@@ -307,7 +308,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total = spread + 2.0 * pow(lf_pearl.alpha, 1.34);
@@ -316,7 +317,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     total = spread + pow(lf_pearl.alpha, 1.34);
@@ -324,7 +325,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * F2 * lobes;

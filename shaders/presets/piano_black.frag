@@ -38,6 +38,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_lacquer = Coat(
@@ -46,18 +47,18 @@ const Coat lf_lacquer = Coat(
 );
 
 const Interface lf_lacquer_interface = Interface(
-    0.0031546694,                                                 // tilt: turn of the mean facet towards a grazing direction
-    0.0015962153,                                                 // gain: part of the reflected light that a second facet lets in
-    vec4(-0.009549635, 0.021495357, -0.023831615, 0.015080304),   // passed: energy that passes, beyond the closed form: four coefficients
-    vec2(0.006754711, -0.0102405865),                             // passed_high: the other two, of higher powers
-    vec4(0.35662532, 0.0044327155, -0.0013419092, 0.0005939007),  // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0071296543, 0.0057293177),                            // bend_high: 
-    vec4(0.75904995, -0.2263068, -0.12822342, -0.057531953),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.45303166, -0.40356708),                                // spread_high: 
-    vec4(1.0096471, -0.02020517, 0.014032036, -0.017403007),      // path: mean path over that of the refracted direction
-    vec2(0.037196398, -0.023304224),                              // path_high: 
-    vec4(0.020879557, -0.03627545, 0.011439269, -0.084810555),    // theta: scale of the path's distribution
-    vec2(0.14554596, -0.042862482)                                // theta_high: 
+    0.0031546694,                                                  // tilt: turn of the mean facet towards a grazing direction
+    0.0015962153,                                                  // gain: part of the reflected light that a second facet lets in
+    vec4(-0.009549635, 0.021495357, -0.023831615, 0.015080304),    // passed: energy that passes, beyond the closed form: four coefficients
+    vec2(0.006754711, -0.0102405865),                              // passed_high: the other two, of higher powers
+    vec4(0.35669813, 0.0042952225, -0.0013002157, 0.00057548285),  // bend: part by which the sine of light becomes smaller below
+    vec2(-0.006908551, 0.005551517),                               // bend_high: 
+    vec4(0.60981756, -0.18181401, -0.103014365, -0.04622081),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.3639639, -0.32422444),                                  // spread_high: 
+    vec4(1.009726, -0.020368248, 0.014042288, -0.017387986),       // path: mean path over that of the refracted direction
+    vec2(0.03754747, -0.023600101),                                // path_high: 
+    vec4(0.020879557, -0.03627545, 0.011439269, -0.084810555),     // theta: scale of the path's distribution
+    vec2(0.14554596, -0.042862482)                                 // theta_high: 
 );
 
 const Lambert lf_black = Lambert(
@@ -107,7 +108,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -165,7 +166,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_lacquer.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_lacquer.eta * lf_lacquer.eta);
-    float value = F * D * V + throughput * (lf_black.albedo / 3.1415927) / (1.0 - lf_black.albedo * lf_black_returned);
+    float value = F * (D * V) + throughput * (lf_black.albedo / 3.1415927) / (1.0 - lf_black.albedo * lf_black_returned);
     return vec3(lit ? value : 0.0);
 }
 

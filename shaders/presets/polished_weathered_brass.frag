@@ -261,7 +261,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
@@ -306,14 +306,14 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     float projection_i = lf_ggx_projection(wi, alpha);
     float projection_o = lf_ggx_projection(wo, alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float boundary = F * D * V;
+    float boundary = F * (D * V);
     vec3 body = lf_below_boundary(wi, wo, eta, escape, albedo);
     vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_brass.eta, lf_brass.k);
     D = lf_ggx_d(lf_half_vector(wi, wo), lf_brass.alpha);
     projection_i = lf_ggx_projection2(wi, lf_brass.alpha);
     projection_o = lf_ggx_projection2(wo, lf_brass.alpha);
     V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    vec3 metal = F2 * D * V;
+    vec3 metal = F2 * (D * V);
     vec3 f = covered * (boundary + body) + bare * metal;
     return lit ? f : vec3(0.0);
 }

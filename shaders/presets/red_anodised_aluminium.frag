@@ -51,6 +51,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 struct Shares {
@@ -70,12 +71,12 @@ const Interface lf_oxide_interface = Interface(
     0.10031511,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.04464719, 0.00010519335, 0.016922252, 0.03386515),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0017023832, -0.012983762),                          // passed_high: the other two, of higher powers
-    vec4(0.28814295, 0.11218918, 0.0026443005, -0.02305597),    // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0026268214, 0.0036585927),                          // bend_high: 
-    vec4(0.79491526, -0.2609493, -0.08429666, 0.0621534),       // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.023329884, -0.05259615),                            // spread_high: 
-    vec4(1.1995242, -0.24667993, -0.0033078194, 0.0689702),     // path: mean path over that of the refracted direction
-    vec2(0.004082024, -0.013128281),                            // path_high: 
+    vec4(0.29142344, 0.108710535, 0.0025622249, -0.022341251),  // bend: part by which the sine of light becomes smaller below
+    vec2(-0.0025453418, 0.003545463),                           // bend_high: 
+    vec4(0.6386317, -0.20964563, -0.06772351, 0.04993409),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.018743232, -0.0422557),                             // spread_high: 
+    vec4(1.204827, -0.25680122, 0.002035737, 0.06922245),       // path: mean path over that of the refracted direction
+    vec2(0.0030804276, -0.012909889),                           // path_high: 
     vec4(0.6451652, -0.96579504, 0.16259342, 0.2337165),        // theta: scale of the path's distribution
     vec2(-0.020245273, 0.0012745932)                            // theta_high: 
 );
@@ -87,21 +88,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.50833756, 0.09431362, 0.115510516),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.012242347, 0.008892648, 0.009700999),    // c1: 
-    vec3(0.0005174726, 0.0009992793, 0.0012087971),  // c2: 
-    vec3(0.05289668, 0.007324919, 0.009552032),      // c3: 
-    vec3(-0.05764675, -0.002809666, -0.0046914294),  // c4: 
-    vec3(-0.08288944, -0.007816762, -0.010921136)    // c5: 
+    vec3(0.50211984, 0.09377763, 0.114810936),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.032300517, 0.0048942417, 0.0048337057),  // c1: 
+    vec3(0.0050753355, 0.0025949702, 0.003090024),   // c2: 
+    vec3(0.068044424, 0.0105571, 0.013551578),       // c3: 
+    vec3(-0.06660494, -0.0066101775, -0.009167798),  // c4: 
+    vec3(-0.09992468, -0.012515008, -0.016608655)    // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.7138674, 0.2263956, 0.25687462),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.027169913, -0.0023563653, -0.0028964654),  // c1: 
-    vec3(0.013744593, 0.011364929, 0.011354789),       // c2: 
-    vec3(0.037334263, 0.025064826, 0.025139183),       // c3: 
-    vec3(-0.07346606, -0.028174885, -0.030802175),     // c4: 
-    vec3(-0.081643164, -0.036571145, -0.03880596)      // c5: 
+    vec3(0.7191084, 0.22766025, 0.2584757),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.030439869, -0.002839949, -0.003449954),  // c1: 
+    vec3(0.008312851, 0.0099888, 0.00967478),        // c2: 
+    vec3(0.032741964, 0.023315012, 0.023171127),     // c3: 
+    vec3(-0.07025036, -0.02730947, -0.029939532),    // c4: 
+    vec3(-0.07784724, -0.03523791, -0.037403524)     // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -145,7 +146,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -192,18 +193,21 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
+// 0 where the indices match and there is no interface, 1 from 1.15 on.
+float lf_presence(float eta) {
+    return 2.0 - 1.0;
+}
+
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
-    float first = pow(i.a, 1.41);
-    float second = pow(o.a, 1.41);
-    float inverse = 1.0 / (base + first + second);
-    return Shares(base * inverse, first * inverse, second * inverse);
+    float base = alpha * (i.w.w + o.w.w);
+    float inverse = 1.0 / (base + i.a + o.a);
+    return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
 vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
-    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    vec3 turn = 0.8241 * share * (i.w.xyz + o.w.xyz);
     float z2 = x.w.w * x.w.w;
     z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
     return vec4(x.w.xyz - turn, sqrt(z2));
@@ -229,15 +233,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
-}
-
-// 0 where the indices match and there is no interface, 1 from 1.15 on.
-float lf_presence(float eta) {
-    return 2.0 - 1.0;
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -248,22 +247,20 @@ vec3 lf_amount(Curve curve, float s) {
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float width2 = pow(pow(max(base, 1e-30), 1.41) + (pow(i.a, 1.41) + pow(o.a, 1.41)), 1.4184397);
-    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t = i.w.xyz + o.w.xyz;
-    float v = dot(t, t) / width2;
-    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
-}
-
-// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
-float lf_wider(float alpha, float coat_alpha) {
-    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
+    float t = i.a + o.a;
+    float shared_ = base * t / (base + t);
+    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
+    vec3 t2 = i.w.xyz + o.w.xyz;
+    float v = dot(t2, t2);
+    return width2 / (3.1415927 * (width2 * width2 + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * width2 + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
-float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * dot(i.w.xyz, o.w.xyz);
-    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+float lf_ahead(Crossing i, Crossing o, float alpha) {
+    vec3 apart = i.air.xyz - o.air.xyz;
+    float back = 0.5 * (dot(apart, apart) + i.air.w * i.air.w + o.air.w * o.air.w);
+    return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
@@ -286,10 +283,11 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_oxide.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_oxide.eta * lf_oxide.eta);
+    float there = lf_presence(lf_oxide.eta);
     Shares shares = lf_split(crossing, crossing2, lf_aluminium.alpha);
-    float part = 0.2675 + 0.5116 * shares.base * shares.base;
-    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    float part = 0.7911 * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_oxide.tau);
@@ -299,12 +297,16 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec4 h = yi + yo;
     float h2 = dot(h, h);
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
-    float rise = 1.0 + 0.468 * lf_presence(lf_oxide.eta) * lf_oxide.alpha * lf_oxide.alpha * shares.base;
+    float rise = 1.0 + 0.3861 * there * lf_oxide.alpha * lf_oxide.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_oxide_again, crossing.s) * lf_amount(lf_oxide_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_oxide.alpha));
+    float shared_ = lf_aluminium.alpha * lf_aluminium.alpha / (lf_aluminium.alpha + lf_aluminium.alpha);
+    float t = sqrt(lf_aluminium.alpha * lf_aluminium.alpha + lf_aluminium.alpha * lf_aluminium.alpha + 3.173 * (shared_ * shared_));
+    float t2 = 0.4 * lf_oxide.alpha;
+    shared_ = t * t2 / (t + t2);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_oxide.eta, lf_aluminium.alpha);
-    vec3 value = F * D * V + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_aluminium.alpha);
+    vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

@@ -39,6 +39,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_urushi = Coat(
@@ -52,12 +53,12 @@ const Interface lf_urushi_interface = Interface(
     0.006316437,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.019861361, 0.03569795, -0.021563128, 0.00021134847),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.018127924, -0.0131169055),                             // passed_high: the other two, of higher powers
-    vec4(0.33807915, 0.015261583, -0.011598721, 0.009115875),     // bend: part by which the sine of light becomes smaller below
-    vec2(-0.009256974, 0.0042676926),                             // bend_high: 
-    vec4(0.7574944, -0.30959716, 0.21663982, -0.3939808),         // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.14949118, -0.03164667),                                // spread_high: 
-    vec4(1.028744, -0.061100602, 0.06624982, -0.0539459),         // path: mean path over that of the refracted direction
-    vec2(0.014147639, 0.006748438),                               // path_high: 
+    vec4(0.33833733, 0.014788263, -0.011239186, 0.008833408),     // bend: part by which the sine of light becomes smaller below
+    vec2(-0.008969933, 0.0041354),                                // bend_high: 
+    vec4(0.60856783, -0.24872911, 0.17404774, -0.3165228),        // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.12010063, -0.025424272),                               // spread_high: 
+    vec4(1.0290464, -0.06173104, 0.06664726, -0.05434048),        // path: mean path over that of the refracted direction
+    vec2(0.015009224, 0.0062069893),                              // path_high: 
     vec4(0.06297798, -0.1371728, 0.16691335, -0.22109175),        // theta: scale of the path's distribution
     vec2(0.1095863, 0.037178833)                                  // theta_high: 
 );
@@ -109,7 +110,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -174,7 +175,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float throughput = crossing.T * crossing2.T / (lf_urushi.eta * lf_urushi.eta);
     vec3 once = lf_urushi.tau + (crossing.path - 1.0) * (2.0 * lf_urushi.tau / (1.0 + lf_spread_root(crossing.theta, lf_urushi.tau)));
     vec3 throughput2 = throughput * exp(-(once + (lf_urushi.tau + (crossing2.path - 1.0) * (2.0 * lf_urushi.tau / (1.0 + lf_spread_root(crossing2.theta, lf_urushi.tau))))));
-    vec3 value = F * D * V + throughput2 * (lf_cinnabar.albedo / 3.1415927) / (1.0 - lf_cinnabar.albedo * lf_cinnabar_returned);
+    vec3 value = F * (D * V) + throughput2 * (lf_cinnabar.albedo / 3.1415927) / (1.0 - lf_cinnabar.albedo * lf_cinnabar_returned);
     return lit ? value : vec3(0.0);
 }
 

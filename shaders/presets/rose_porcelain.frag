@@ -38,6 +38,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_glaze = Coat(
@@ -50,12 +51,12 @@ const Interface lf_glaze_interface = Interface(
     0.0035753467,                                                // gain: part of the reflected light that a second facet lets in
     vec4(-0.0151992105, 0.03096597, -0.026210945, 0.008551259),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.015562363, -0.01404037),                              // passed_high: the other two, of higher powers
-    vec4(0.3285231, 0.00898914, -0.0055016875, 0.004494518),     // bend: part by which the sine of light becomes smaller below
-    vec2(-0.009576365, 0.006164044),                             // bend_high: 
-    vec4(0.73397744, -0.26290506, 0.06938703, -0.28459442),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.29432896, -0.17842531),                               // spread_high: 
-    vec4(1.0184151, -0.03971097, 0.042725146, -0.041764855),     // path: mean path over that of the refracted direction
-    vec2(0.027597368, -0.0068594217),                            // path_high: 
+    vec4(0.32867226, 0.008710392, -0.0053312182, 0.0043553114),  // bend: part by which the sine of light becomes smaller below
+    vec2(-0.009279445, 0.0059728324),                            // bend_high: 
+    vec4(0.5896745, -0.21121684, 0.055745453, -0.22864234),      // spread: width of a lobe seen through it, over that of the facets
+    vec2(0.23646295, -0.14334577),                               // spread_high: 
+    vec4(1.018596, -0.04008779, 0.042867064, -0.041899323),      // path: mean path over that of the refracted direction
+    vec2(0.028283417, -0.0073643923),                            // path_high: 
     vec4(0.03754024, -0.07790418, 0.08442601, -0.15448993),      // theta: scale of the path's distribution
     vec2(0.13333824, -0.008031782)                               // theta_high: 
 );
@@ -107,7 +108,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -165,7 +166,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_glaze.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_glaze.eta * lf_glaze.eta);
-    vec3 value = F * D * V + throughput * (lf_paint.albedo / 3.1415927) / (1.0 - lf_paint.albedo * lf_paint_returned);
+    vec3 value = F * (D * V) + throughput * (lf_paint.albedo / 3.1415927) / (1.0 - lf_paint.albedo * lf_paint_returned);
     return lit ? value : vec3(0.0);
 }
 

@@ -47,7 +47,7 @@ const Pigment lf_rust_pigment = Pigment(
     vec3(0.060000002, 0.030000001, 0.012),  // S: scattering of diffuse light [1/um]
     0.7,                                    // alpha: width of the facet slopes of its boundary
     1.9,                                    // eta: index of refraction, against air
-    0.23615637                              // escape: part of diffuse light from below that passes its boundary
+    0.2361564                               // escape: part of diffuse light from below that passes its boundary
 );
 
 const Growth lf_rust_growth = Growth(
@@ -226,7 +226,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + abs(p)));
     vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
@@ -246,14 +246,14 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     float projection_i = lf_ggx_projection(wi, lf_rust_pigment.alpha);
     float projection_o = lf_ggx_projection(wo, lf_rust_pigment.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float boundary = F * D * V;
+    float boundary = F * (D * V);
     vec3 body = lf_below_boundary(wi, wo, lf_rust_pigment.eta, lf_rust_pigment.escape, albedo);
     vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_iron.eta, lf_iron.k);
     D = lf_ggx_d(lf_half_vector(wi, wo), lf_iron.alpha);
     projection_i = lf_ggx_projection(wi, lf_iron.alpha);
     projection_o = lf_ggx_projection(wo, lf_iron.alpha);
     V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    vec3 metal = F2 * D * V;
+    vec3 metal = F2 * (D * V);
     vec3 f = share * (boundary + body) + through * metal;
     return lit ? f : vec3(0.0);
 }

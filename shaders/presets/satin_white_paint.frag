@@ -38,6 +38,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_surface = Coat(
@@ -50,12 +51,12 @@ const Interface lf_surface_interface = Interface(
     0.23253432,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.117580555, 0.06625485, -0.008904142, 0.026615268),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.019321598, -0.003716942),                            // passed_high: the other two, of higher powers
-    vec4(0.16015665, 0.08384476, 0.050894096, 0.018529266),     // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0102761835, -0.010899454),                          // bend_high: 
-    vec4(0.47685713, 0.016207732, -0.037082642, -0.043587685),  // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.036313757, -0.016467094),                           // spread_high: 
-    vec4(1.2581091, -0.23291028, -0.0692915, 0.04006815),       // path: mean path over that of the refracted direction
-    vec2(0.022292256, 9.179115e-06),                            // path_high: 
+    vec4(0.16552648, 0.0812449, 0.04931599, 0.017954648),       // bend: part by which the sine of light becomes smaller below
+    vec2(-0.009957552, -0.010561466),                           // bend_high: 
+    vec4(0.3831051, 0.013021208, -0.029791906, -0.035018355),   // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.029174253, -0.0132294595),                          // spread_high: 
+    vec4(1.2751803, -0.25845492, -0.06610456, 0.045912266),     // path: mean path over that of the refracted direction
+    vec2(0.022619247, -0.0008739233),                           // path_high: 
     vec4(0.86954325, -1.0685096, -0.09935013, 0.33906257),      // theta: scale of the path's distribution
     vec2(0.066010416, -0.044408634)                             // theta_high: 
 );
@@ -107,7 +108,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -165,7 +166,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_surface.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_surface.eta * lf_surface.eta);
-    vec3 value = F * D * V + throughput * (lf_paint.albedo / 3.1415927) / (1.0 - lf_paint.albedo * lf_paint_returned);
+    vec3 value = F * (D * V) + throughput * (lf_paint.albedo / 3.1415927) / (1.0 - lf_paint.albedo * lf_paint_returned);
     return lit ? value : vec3(0.0);
 }
 

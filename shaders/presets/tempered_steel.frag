@@ -103,7 +103,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_i = lf_ggx_projection(wi, lf_steel.alpha);
     float projection_o = lf_ggx_projection(wo, lf_steel.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    vec3 value = F * D * V;
+    vec3 value = F * (D * V);
     return lit ? value : vec3(0.0);
 }
 

@@ -40,6 +40,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_varnish = Coat(
@@ -53,12 +54,12 @@ const Interface lf_varnish_interface = Interface(
     0.02422721,                                                // gain: part of the reflected light that a second facet lets in
     vec4(-0.0321689, 0.029983805, 0.015549282, -0.015668225),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0009908297, -1.5788479e-05),                        // passed_high: the other two, of higher powers
-    vec4(0.30497074, 0.047664583, -0.03117545, 0.011052132),   // bend: part by which the sine of light becomes smaller below
-    vec2(0.003764987, -0.005176604),                           // bend_high: 
-    vec4(0.7752975, -0.4359295, 0.25017366, -0.13368165),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.13237008, 0.048883975),                            // spread_high: 
-    vec4(1.0800009, -0.15213847, 0.098820835, -0.015977979),   // path: mean path over that of the refracted direction
-    vec2(-0.025763214, 0.016999125),                           // path_high: 
+    vec4(0.3058502, 0.04618659, -0.030208841, 0.010709345),    // bend: part by which the sine of light becomes smaller below
+    vec2(0.003648311, -0.005016148),                           // bend_high: 
+    vec4(0.6228708, -0.35022393, 0.20098852, -0.10739961),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.10634582, 0.03927332),                             // spread_high: 
+    vec4(1.0811925, -0.15474677, 0.10140231, -0.017850518),    // path: mean path over that of the refracted direction
+    vec2(-0.02525264, 0.017201781),                            // path_high: 
     vec4(0.19103706, -0.40984368, 0.36370075, -0.20119762),    // theta: scale of the path's distribution
     vec2(-0.042300656, 0.12330281)                             // theta_high: 
 );
@@ -124,7 +125,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -223,7 +224,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float throughput = crossing.T * crossing2.T / (lf_varnish.eta * lf_varnish.eta);
     vec3 once = lf_varnish.tau + (crossing.path - 1.0) * (2.0 * lf_varnish.tau / (1.0 + lf_spread_root(crossing.theta, lf_varnish.tau)));
     vec3 throughput2 = throughput * exp(-(once + (lf_varnish.tau + (crossing2.path - 1.0) * (2.0 * lf_varnish.tau / (1.0 + lf_spread_root(crossing2.theta, lf_varnish.tau))))));
-    vec3 value = F * D * V + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_wood.albedo, lf_wood.sigma) / (1.0 - lf_wood.albedo * lf_wood_returned);
+    vec3 value = F * (D * V) + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_wood.albedo, lf_wood.sigma) / (1.0 - lf_wood.albedo * lf_wood_returned);
     return lit ? value : vec3(0.0);
 }
 

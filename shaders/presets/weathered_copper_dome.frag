@@ -299,7 +299,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
     vec3 larger = sqrt(0.5 * (q + abs(p)));
     vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
@@ -367,7 +367,7 @@ float lf_transmittance_dielectric2(float c, float eta) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
     float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -405,19 +405,6 @@ vec4 lf_steer(vec4 w, float lengthening) {
     return vec4(w.xyz * ratio, z);
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor2(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
@@ -427,10 +414,10 @@ vec3 lf_fresnel_conductor2(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
@@ -439,14 +426,24 @@ float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
     return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
-}
-
 // The same by the depth of scattering within `tau`, and paths in thicknesses: 1 / cos, or longer below a rough boundary.
 vec3 lf_once_back(float phase, vec3 tau_s, vec3 tau, float path_i, float path_o) {
     return tau_s * (phase * path_i * path_o) * lf_mean_transmittance(tau * (path_i + path_o));
+}
+
+// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
+vec3 lf_fresnel_conductor3(float c, vec3 eta, vec3 k) {
+    float c2 = c * c;
+    float s2 = 1.0 - c2;
+    vec3 p = (eta - k) * (eta + k) - s2;
+    vec3 nk = eta * k;
+    vec3 q = sqrt(p * p + 4.0 * nk * nk);
+    vec3 larger = sqrt(0.5 * (q + (-p)));
+    vec3 a = nk / larger;
+    vec3 twice_ac = a * (2.0 * c);
+    vec3 even = q * c2 + s2 * s2;
+    vec3 odd = twice_ac * s2;
+    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
 }
 
 // The same for light that goes on to the other side.
@@ -492,21 +489,6 @@ TwoFlux lf_kubelka_munk(vec3 Kx, float Sx) {
     vec3 cosh_z = mix(0.5 * (1.0 + fall * fall), cosh_z2, thin);
     vec3 whole = (Kx + Sx) * sinh_z + cosh_z;
     return TwoFlux(Sx * sinh_z / whole, fall / whole);
-}
-
-// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
-vec3 lf_fresnel_conductor3(float c, vec3 eta, vec3 k) {
-    float c2 = c * c;
-    float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -622,7 +604,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv, float sky) {
     float projection_i = lf_ggx_projection(wi, lf_patina_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_patina_coat.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wi, wi);
     Crossing o = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wo, wo);
     float throughput = i.T * o.T / (lf_patina_coat.eta * lf_patina_coat.eta);
@@ -635,12 +617,12 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv, float sky) {
     vec3 directional = lf_transmittance(t + t2, straight + 0.5 * added);
     vec4 wi2 = lf_steer(i.w, 0.5 * i.drift);
     vec4 wo2 = lf_steer(o.w, 0.5 * o.drift);
-    vec4 h = lf_half_vector2(wi2, wo2);
-    vec3 F2 = lf_fresnel_conductor2(lf_half_cosine2(wi2, wo2), lf_base.eta, lf_base.k);
+    vec4 h = lf_half_vector(wi2, wo2);
+    vec3 F2 = lf_fresnel_conductor2(lf_half_cosine(wi2, wo2), lf_base.eta, lf_base.k);
     float R = 0.5 * (R_i + R_o);
     float edge_i = lf_edge_reflection(sin_i, i.w.w, lf_patina_interface.n, lf_base.alpha);
     float edge_o = lf_edge_reflection(sin_o, o.w.w, lf_patina_interface.n, lf_base.alpha);
-    vec3 q = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
+    vec3 q = F2 * directional * (R + (1.0 - R) * (0.5 * (edge_i + edge_o)));
     float spread = (pow(i.spread, 1.34) + pow(o.spread, 1.34)) * pow(lf_patina_coat.alpha, 1.34);
     float total7 = spread + 3.0 * pow(lf_base.alpha, 1.34);
     total7 = total7 + 2.0 * pow(lf_patina_coat.alpha, 1.34);
@@ -648,7 +630,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv, float sky) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total7 = spread + 2.0 * pow(lf_base.alpha, 1.34);
@@ -657,7 +639,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv, float sky) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     total7 = spread + pow(lf_base.alpha, 1.34);
@@ -665,10 +647,10 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv, float sky) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
-    vec3 f2 = f + throughput * directional * F2 * lobes;
+    vec3 f2 = f + throughput * (F2 * directional) * lobes;
     float path = 1.0 / i.w.w;
     path = path + i.lengthening;
     float path2 = 1.0 / o.w.w;
@@ -676,23 +658,23 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv, float sky) {
     vec3 f3 = lf_once_back(0.07957747, t2, t3, path, path2);
     Fluence beam_i = lf_fluence(t3, path);
     Fluence beam_o = lf_fluence(t3, path2);
-    vec3 up_i = lf_fresnel_conductor2(i.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path);
-    vec3 up_o = lf_fresnel_conductor2(o.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path2);
+    vec3 up_i = lf_fresnel_conductor3(i.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path);
+    vec3 up_o = lf_fresnel_conductor3(o.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path2);
     vec3 f4 = lf_once_by_mirror(0.07957747, 0.07957747, t2, t3, path, path2, up_i, up_o);
     f3 = f3 + f4;
-    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor2(i.w.w, lf_base.eta, lf_base.k), R_i);
-    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor2(o.w.w, lf_base.eta, lf_base.k), R_o);
+    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor3(i.w.w, lf_base.eta, lf_base.k), R_i);
+    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor3(o.w.w, lf_base.eta, lf_base.k), R_o);
     f2 = f2 + throughput * (f3 + lf_exchanged(Haze(t3, (t5 - t17 * t8 - t14 * ((t11 - t15 * t5 - t16 * t8) * t18)) * t4, (t6 - t17 * t9 - t14 * t12) * t4, (t7 - t17 * t10 - t14 * t13) * t4, (t9 - t20 * t12) * t4, (t10 - t20 * t13) * t4, t13 * t4), beam_i, beam_o));
     vec3 patina = lit2 ? f2 : vec3(0.0);
     TwoFlux layer = lf_kubelka_munk(lf_patina_crust.absorbed * thickness, lf_patina_crust.scattered * thickness);
     vec3 diffuse = layer.R / 3.1415927;
     patina = patina + diffuse;
-    F2 = lf_fresnel_conductor3(lf_half_cosine(wi, wo), lf_base_bare.eta, lf_base_bare.k);
+    F2 = lf_fresnel_conductor2(lf_half_cosine(wi, wo), lf_base_bare.eta, lf_base_bare.k);
     D = lf_ggx_d(lf_half_vector(wi, wo), lf_base_bare.alpha);
     projection_i = lf_ggx_projection(wi, lf_base_bare.alpha);
     projection_o = lf_ggx_projection(wo, lf_base_bare.alpha);
     V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    vec3 bare = F2 * D * V;
+    vec3 bare = F2 * (D * V);
     f2 = cover.bare * bare + cover.covered * patina;
     return lit ? f2 : vec3(0.0);
 }

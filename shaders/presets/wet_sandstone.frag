@@ -39,6 +39,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 const Coat lf_water = Coat(
@@ -51,12 +52,12 @@ const Interface lf_water_interface = Interface(
     0.009790741,                                                 // gain: part of the reflected light that a second facet lets in
     vec4(-0.026004575, 0.04301408, -0.014314687, -0.010176732),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.016221277, -0.00915219),                              // passed_high: the other two, of higher powers
-    vec4(0.23798709, 0.019061, -0.016051926, 0.010993689),       // bend: part by which the sine of light becomes smaller below
-    vec2(-0.004579872, 4.8696995e-05),                           // bend_high: 
-    vec4(0.62818056, -0.31912512, 0.21570803, -0.312871),        // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.00026713312, 0.06709802),                            // spread_high: 
-    vec4(1.0396754, -0.087371826, 0.08643061, -0.052159548),     // path: mean path over that of the refracted direction
-    vec2(-0.0052142143, 0.01943636),                             // path_high: 
+    vec4(0.23830128, 0.018469945, -0.0155542195, 0.01065287),    // bend: part by which the sine of light becomes smaller below
+    vec2(-0.004437864, 4.7057867e-05),                           // bend_high: 
+    vec4(0.50467765, -0.25638375, 0.1732992, -0.2513595),        // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.00021466613, 0.05390638),                            // spread_high: 
+    vec4(1.0402317, -0.08861905, 0.08753228, -0.053181887),      // path: mean path over that of the refracted direction
+    vec2(-0.004088104, 0.018918514),                             // path_high: 
     vec4(0.06900233, -0.16027227, 0.19247234, -0.19428445),      // theta: scale of the path's distribution
     vec2(0.05203541, 0.05342995)                                 // theta_high: 
 );
@@ -122,7 +123,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // The cosine between either direction and their half vector.
@@ -214,7 +215,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_o = lf_ggx_projection(wo, lf_water.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_water.eta * lf_water.eta);
-    vec3 value = F * D * V + throughput * lf_oren_nayar_full(crossing.w, crossing2.w, lf_stone.albedo, lf_stone.sigma) / (1.0 - lf_stone.albedo * lf_stone_returned);
+    vec3 value = F * (D * V) + throughput * lf_oren_nayar_full(crossing.w, crossing2.w, lf_stone.albedo, lf_stone.sigma) / (1.0 - lf_stone.albedo * lf_stone_returned);
     return lit ? value : vec3(0.0);
 }
 

@@ -125,7 +125,7 @@ float lf_with_second_facet(float T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
     float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -163,19 +163,6 @@ vec4 lf_steer(vec4 w, float lengthening) {
     return vec4(w.xyz * ratio, z);
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
@@ -185,21 +172,16 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
     float m = 0.5 * (1.0 - sine) / (n * cosine);
     return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
-}
-
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -210,7 +192,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_coat_interface, lf_coat, wi, wi);
     Crossing o = lf_cross(lf_coat_interface, lf_coat, wo, wo);
     float throughput = i.T * o.T / (lf_coat.eta * lf_coat.eta);
@@ -223,12 +205,12 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 directional = lf_transmittance(lf_coat.tau, straight + 0.5 * added);
     wi = lf_steer(i.w, 0.5 * i.drift);
     wo = lf_steer(o.w, 0.5 * o.drift);
-    vec4 h = lf_half_vector2(wi, wo);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(wi, wo), lf_base.eta, lf_base.k);
+    vec4 h = lf_half_vector(wi, wo);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_base.eta, lf_base.k);
     float R = 0.5 * (R_i + R_o);
     float edge_i = lf_edge_reflection(sin_i, i.w.w, lf_coat_interface.n, lf_base.alpha);
     float edge_o = lf_edge_reflection(sin_o, o.w.w, lf_coat_interface.n, lf_base.alpha);
-    vec3 q = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
+    vec3 q = F2 * directional * (R + (1.0 - R) * (0.5 * (edge_i + edge_o)));
     float spread = (pow(i.spread, 1.34) + pow(o.spread, 1.34)) * pow(lf_coat.alpha, 1.34);
     float total = spread + 3.0 * pow(lf_base.alpha, 1.34);
     total = total + 2.0 * pow(lf_coat.alpha, 1.34);
@@ -236,7 +218,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total = spread + 2.0 * pow(lf_base.alpha, 1.34);
@@ -245,7 +227,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     total = spread + pow(lf_base.alpha, 1.34);
@@ -253,10 +235,10 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
-    vec3 f2 = f + throughput * directional * F2 * lobes;
+    vec3 f2 = f + throughput * (F2 * directional) * lobes;
     return lit ? f2 : vec3(0.0);
 }
 

@@ -122,7 +122,7 @@ float lf_with_second_facet(float T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
     float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -160,7 +160,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_coat_interface, lf_coat, wi, wi);
     Crossing o = lf_cross(lf_coat_interface, lf_coat, wo, wo);
     float throughput = i.T * o.T / (lf_coat.eta * lf_coat.eta);

@@ -140,7 +140,7 @@ float lf_with_second_facet(float T, float gain) {
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
     float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
-    return scale * pow(max(one_minus, 1e-30), 3.16) * exp(-7.0 * alpha * one_minus);
+    return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
@@ -178,19 +178,6 @@ vec4 lf_steer(vec4 w, float lengthening) {
     return vec4(w.xyz * ratio, z);
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
 float lf_fresnel_dielectric2(float c, float eta) {
     float delta = (eta - 1.0) * (eta + 1.0);
@@ -210,11 +197,6 @@ float lf_fresnel_dielectric2(float c, float eta) {
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
     float m = 0.5 * (1.0 - sine) / (n * cosine);
     return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
-}
-
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // Cosine below a boundary of relative index `eta` (Snell's law); 0 under total internal reflection.
@@ -239,6 +221,19 @@ Crossing lf_cross2(Interface interface_, Coat coat, vec4 w, vec4 air) {
     return Crossing(below, T, lf_slope_spread2(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
+// The unit vector halfway between two directions on the same side of the surface.
+vec4 lf_half_vector2(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    return s * inversesqrt(dot(s, s));
+}
+
+// The cosine between either direction and their half vector.
+float lf_half_cosine2(vec4 wi, vec4 wo) {
+    vec4 s = wi + wo;
+    float s2 = dot(s, s);
+    return min(0.5 * sqrt(s2), 1.0);
+}
+
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
@@ -248,10 +243,15 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+}
+
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -262,7 +262,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float f = F * D * V;
+    float f = F * (D * V);
     Crossing i = lf_cross(lf_coat_interface, lf_coat, wi, wi);
     Crossing o = lf_cross(lf_coat_interface, lf_coat, wo, wo);
     float throughput = i.T * o.T / (lf_coat.eta * lf_coat.eta);
@@ -275,12 +275,12 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 directional = lf_transmittance(lf_coat.tau, straight + 0.5 * added);
     vec4 wi2 = lf_steer(i.w, 0.5 * i.drift);
     vec4 wo2 = lf_steer(o.w, 0.5 * o.drift);
-    vec4 h = lf_half_vector2(wi2, wo2);
-    F = lf_fresnel_dielectric2(lf_half_cosine2(wi2, wo2), lf_primer.eta);
+    vec4 h = lf_half_vector(wi2, wo2);
+    F = lf_fresnel_dielectric2(lf_half_cosine(wi2, wo2), lf_primer.eta);
     float R = 0.5 * (R_i + R_o);
     float edge_i = lf_edge_reflection(sin_i, i.w.w, lf_coat_interface.n, lf_primer.alpha);
     float edge_o = lf_edge_reflection(sin_o, o.w.w, lf_coat_interface.n, lf_primer.alpha);
-    vec3 q = F * (R + (1.0 - R) * (0.5 * (edge_i + edge_o))) * directional;
+    vec3 q = F * directional * (R + (1.0 - R) * (0.5 * (edge_i + edge_o)));
     float spread = (pow(i.spread, 1.34) + pow(o.spread, 1.34)) * pow(lf_coat.alpha, 1.34);
     float total = spread + 3.0 * pow(lf_primer.alpha, 1.34);
     total = total + 2.0 * pow(lf_coat.alpha, 1.34);
@@ -288,7 +288,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total = spread + 2.0 * pow(lf_primer.alpha, 1.34);
@@ -297,7 +297,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     total = spread + pow(lf_primer.alpha, 1.34);
@@ -305,10 +305,10 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith2(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
-    vec3 f2 = f + throughput * directional * F * lobes;
+    vec3 f2 = f + throughput * (F * directional) * lobes;
     Crossing i2 = lf_cross2(lf_primer_interface, lf_primer, i.w, wi);
     Crossing o2 = lf_cross2(lf_primer_interface, lf_primer, o.w, wo);
     float throughput2 = i2.T * o2.T / (lf_primer.eta * lf_primer.eta);
@@ -329,7 +329,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 R2 = 0.5 * (R_i2 + R_o2);
     edge_i = lf_edge_reflection(sin_i, i2.w.w, lf_primer_interface.n, lf_base.alpha);
     edge_o = lf_edge_reflection(sin_o, o2.w.w, lf_primer_interface.n, lf_base.alpha);
-    q = F2 * (R2 + (1.0 - R2) * (0.5 * (edge_i + edge_o))) * directional;
+    q = F2 * directional * (R2 + (1.0 - R2) * (0.5 * (edge_i + edge_o)));
     spread = (pow(i.spread, 1.34) + pow(o.spread, 1.34)) * pow(lf_coat.alpha, 1.34);
     spread = spread + (pow(i2.spread, 1.34) + pow(o2.spread, 1.34)) * pow(lf_primer.alpha, 1.34);
     total = spread + 3.0 * pow(lf_base.alpha, 1.34);
@@ -358,7 +358,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
-    f2 = f2 + throughput3 * directional * F2 * lobes;
+    f2 = f2 + throughput3 * (F2 * directional) * lobes;
     return lit ? f2 : vec3(0.0);
 }
 

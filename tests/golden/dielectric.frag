@@ -69,7 +69,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float projection_i = lf_ggx_projection(wi, lf_base.alpha);
     float projection_o = lf_ggx_projection(wo, lf_base.alpha);
     float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
-    float value = F * D * V;
+    float value = F * (D * V);
     return vec3(lit ? value : 0.0);
 }
 

@@ -102,7 +102,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
@@ -138,7 +138,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec4 wi_below = lf_refract_about_facet(wi, h, c, c_below, lf_coat.eta);
     vec4 wo_below = lf_refract_about_facet(wo, h, c, c_below, lf_coat.eta);
     float T12 = lf_transmittance_dielectric(c, lf_coat.eta);
-    float t = 1.0 - G * (1.0 - T12);
+    float t = 1.0 - G * F;
     bool lit2 = min(wi_below.w, wo_below.w) > 0.0;
     D = lf_ggx_d(h, lf_base.alpha);
     float projection_i = lf_ggx_projection(wi_below, lf_base.alpha);

@@ -51,6 +51,7 @@ struct Crossing {
     float path;   // mean path, in thicknesses
     float theta;  // scale of the path's distribution
     float s;      // argument of the baked curves
+    vec4 air;     // direction above
 };
 
 struct Shares {
@@ -76,12 +77,12 @@ const Interface lf_coat_top = Interface(
     0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.035054997, 0.020641431, 0.025624495, -0.0064411927),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0061165085, -0.00076546334),                          // passed_high: the other two, of higher powers
-    vec4(0.29210538, 0.0642801, -0.031056285, 0.0017112494),      // bend: part by which the sine of light becomes smaller below
-    vec2(0.0066233575, -0.0037422478),                            // bend_high: 
-    vec4(0.7778974, -0.42731008, 0.14473301, 0.0003119707),       // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.11521681, -0.009224892),                              // spread_high: 
-    vec4(1.1060052, -0.18565032, 0.08457264, 0.017342567),        // path: mean path over that of the refracted direction
-    vec2(-0.025979936, 0.0063171387),                             // path_high: 
+    vec4(0.29338372, 0.062286936, -0.030093238, 0.0016581714),    // bend: part by which the sine of light becomes smaller below
+    vec2(0.0064179003, -0.0036261976),                            // bend_high: 
+    vec4(0.62495965, -0.34329897, 0.11627789, 0.00025048852),     // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.09256491, -0.0074115098),                             // spread_high: 
+    vec4(1.1078705, -0.18972442, 0.08829877, 0.015281439),        // path: mean path over that of the refracted direction
+    vec2(-0.025942624, 0.006829977),                              // path_high: 
     vec4(0.26631966, -0.53991795, 0.37586775, -0.10775492),       // theta: scale of the path's distribution
     vec2(-0.07368938, 0.10674948)                                 // theta_high: 
 );
@@ -91,41 +92,41 @@ const Interface lf_coat_both = Interface(
     0.036722906,                                                  // gain: part of the reflected light that a second facet lets in
     vec4(-0.035054997, 0.020641431, 0.025624495, -0.0064411927),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0061165085, -0.00076546334),                          // passed_high: the other two, of higher powers
-    vec4(0.39746922, 0.057255983, -0.027260408, 0.002767682),     // bend: part by which the sine of light becomes smaller below
-    vec2(0.0068576634, -0.00264287),                              // bend_high: 
-    vec4(0.09954319, -0.03336258, 0.012172839, -0.000896357),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.011329744, -0.0025816858),                            // spread_high: 
-    vec4(1.0546787, -0.07149202, 0.017656773, 0.017326474),       // path: mean path over that of the refracted direction
-    vec2(-0.010948896, -0.0020992756),                            // path_high: 
-    vec4(0.08373746, -0.15304106, 0.07681082, 0.021044184),       // theta: scale of the path's distribution
-    vec2(-0.030428441, 0.0178402)                                 // theta_high: 
+    vec4(0.39897925, 0.055370897, -0.026322454, 0.002631843),     // bend: part by which the sine of light becomes smaller below
+    vec2(0.0066494346, -0.0025504231),                            // bend_high: 
+    vec4(0.081670046, -0.026981693, 0.009266108, -0.0005811006),  // spread: width of a lobe seen through it, over that of the facets
+    vec2(-0.009128239, -0.0023098513),                            // spread_high: 
+    vec4(1.0558188, -0.07341197, 0.019338906, 0.016380668),       // path: mean path over that of the refracted direction
+    vec2(-0.011226952, -0.0017836094),                            // path_high: 
+    vec4(0.08372111, -0.15378262, 0.07919104, 0.01891802),        // theta: scale of the path's distribution
+    vec2(-0.030415025, 0.018339284)                               // theta_high: 
 );
 
 const Curve lf_coat_passed = Curve(
-    vec3(0.98885643, 0.9825332, 0.9749934),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0048447847, 0.0019959211, 0.008327633),   // c1: 
-    vec3(-0.008213818, -0.008019477, -0.0050720274),  // c2: 
-    vec3(-0.003549695, -0.0004518032, 0.0027161837),  // c3: 
-    vec3(0.008597374, 0.0072605014, 0.005341053),     // c4: 
-    vec3(0.008965015, 0.006336689, 0.0031301975)      // c5: 
+    vec3(0.9887751, 0.9825274, 0.9750761),             // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0047635734, 0.0019268095, 0.00810504),     // c1: 
+    vec3(-0.008041143, -0.007782489, -0.0048092604),   // c2: 
+    vec3(-0.0037423372, -0.0006400347, 0.0025594234),  // c3: 
+    vec3(0.008578777, 0.0072550774, 0.0053499937),     // c4: 
+    vec3(0.0090043545, 0.006368518, 0.003155589)       // c5: 
 );
 
 const Curve lf_coat_inner_again = Curve(
-    vec3(0.68565, 0.4859706, 0.24335311),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.17177114, -0.08744605, -0.031251997),   // c1: 
-    vec3(0.007447973, 0.028321177, 0.018363692),    // c2: 
-    vec3(-0.005469978, 0.01605329, 0.03381288),     // c3: 
-    vec3(-0.105131224, -0.09610081, -0.052035764),  // c4: 
-    vec3(-0.08790657, -0.09205216, -0.062161952)    // c5: 
+    vec3(0.6817516, 0.48762602, 0.24483596),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.17641452, -0.09085984, -0.03295686),    // c1: 
+    vec3(0.008886337, 0.017604865, 0.013391711),    // c2: 
+    vec3(-0.029954016, 0.00023180246, 0.02364315),  // c3: 
+    vec3(-0.10627863, -0.090021774, -0.049215138),  // c4: 
+    vec3(-0.065580994, -0.07798141, -0.05447258)    // c5: 
 );
 
 const Curve lf_coat_inner_rest = Curve(
-    vec3(0.09114473, 0.074156426, 0.048794918),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.017879615, -0.012615352, -0.0066391244),    // c1: 
-    vec3(-0.00023009628, 0.0017982423, 0.0009799618),   // c2: 
-    vec3(-0.012969289, -0.006727636, -0.0021987557),    // c3: 
-    vec3(-0.0117995925, -0.01217526, -0.008717734),     // c4: 
-    vec3(-0.0020358562, -0.0063103773, -0.0059840716)   // c5: 
+    vec3(0.091247536, 0.074555315, 0.049194414),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.018326074, -0.012940391, -0.0070063677),   // c1: 
+    vec3(-1.1052936e-05, 0.001524169, 0.0011310391),   // c2: 
+    vec3(-0.013046004, -0.006888654, -0.0021451935),   // c3: 
+    vec3(-0.011748537, -0.012056703, -0.008981697),    // c4: 
+    vec3(-0.0020795166, -0.006252013, -0.0061957054)   // c5: 
 );
 
 const Conductor lf_base = Conductor(
@@ -135,21 +136,21 @@ const Conductor lf_base = Conductor(
 );
 
 const Curve lf_coat_again = Curve(
-    vec3(0.3433084, 0.44900802, 0.3121879),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.007885136, -0.019462474, -0.026199639),  // c1: 
-    vec3(0.025252238, 0.026830286, 0.019494131),     // c2: 
-    vec3(0.008871883, -0.005285442, 0.01586482),     // c3: 
-    vec3(-0.052790955, -0.065843314, -0.054506034),  // c4: 
-    vec3(-0.03575173, -0.036551833, -0.049341172)    // c5: 
+    vec3(0.33393082, 0.43529058, 0.29938802),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.024904504, -0.03508725, -0.03115151),   // c1: 
+    vec3(0.031484477, 0.028582111, 0.016576529),    // c2: 
+    vec3(0.05128336, 0.029459685, 0.015582085),     // c3: 
+    vec3(-0.070911825, -0.07764107, -0.05261804),   // c4: 
+    vec3(-0.07806337, -0.071961105, -0.048757672)   // c5: 
 );
 
 const Curve lf_coat_rest = Curve(
-    vec3(0.47580677, 0.37167528, 0.24029642),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.013003267, -0.016849011, -0.022144146),  // c1: 
-    vec3(0.04136759, 0.015886098, 0.0069574267),     // c2: 
-    vec3(0.032524765, -0.0036182702, 0.009152859),   // c3: 
-    vec3(-0.072990045, -0.038214356, -0.02734989),   // c4: 
-    vec3(-0.0659883, -0.0233365, -0.028268576)       // c5: 
+    vec3(0.47854635, 0.37205938, 0.23941284),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.010893799, -0.015971012, -0.021451183),   // c1: 
+    vec3(0.02565062, 0.007946074, 0.0048397034),      // c2: 
+    vec3(0.0055758357, -0.01969567, -0.00030514598),  // c3: 
+    vec3(-0.055335462, -0.028815418, -0.023669586),   // c4: 
+    vec3(-0.041611016, -0.0074115098, -0.018223673)   // c5: 
 );
 
 // The cosine between either direction and their half vector.
@@ -237,7 +238,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s);
+    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -252,16 +253,14 @@ vec3 lf_amount(Curve curve, float s) {
 
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, float alpha) {
-    float base = pow(max(alpha * (i.w.w + o.w.w), 1e-30), 1.41);
-    float first = pow(i.a, 1.41);
-    float second = pow(o.a, 1.41);
-    float inverse = 1.0 / (base + first + second);
-    return Shares(base * inverse, first * inverse, second * inverse);
+    float base = alpha * (i.w.w + o.w.w);
+    float inverse = 1.0 / (base + i.a + o.a);
+    return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
 vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
-    vec3 turn = 1.099 * share * (i.w.xyz + o.w.xyz);
+    vec3 turn = 0.8241 * share * (i.w.xyz + o.w.xyz);
     float z2 = x.w.w * x.w.w;
     z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
     return vec4(x.w.xyz - turn, sqrt(z2));
@@ -290,22 +289,20 @@ vec3 lf_spread_root(float theta, vec3 tau) {
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float width2 = pow(pow(max(base, 1e-30), 1.41) + (pow(i.a, 1.41) + pow(o.a, 1.41)), 1.4184397);
-    float x = 0.2559 * (width2 / (base * base + 0.3109 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t = i.w.xyz + o.w.xyz;
-    float v = dot(t, t) / width2;
-    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
-}
-
-// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
-float lf_wider(float alpha, float coat_alpha) {
-    return pow(pow(alpha, 1.41) + pow(alpha, 1.41) + pow(0.9226 * coat_alpha, 1.41), 0.7092199);
+    float t = i.a + o.a;
+    float shared_ = base * t / (base + t);
+    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
+    vec3 t2 = i.w.xyz + o.w.xyz;
+    float v = dot(t2, t2);
+    return width2 / (3.1415927 * (width2 * width2 + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * width2 + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
-float lf_ahead(Crossing i, Crossing o, float eta, float alpha) {
-    float back = eta * eta * dot(i.w.xyz, o.w.xyz);
-    return max(1.0 - (1.0 - alpha) * back, 0.0) / 3.1415927;
+float lf_ahead(Crossing i, Crossing o, float alpha) {
+    vec3 apart = i.air.xyz - o.air.xyz;
+    float back = 0.5 * (dot(apart, apart) + i.air.w * i.air.w + o.air.w * o.air.w);
+    return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
@@ -326,7 +323,7 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
     vec3 a = nk / larger;
-    vec3 twice_ac = 2.0 * a * c;
+    vec3 twice_ac = a * (2.0 * c);
     vec3 even = q * c2 + s2 * s2;
     vec3 odd = twice_ac * s2;
     return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
@@ -348,18 +345,20 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float alpha = lf_coat.alpha + there * (lf_primer.alpha - lf_coat.alpha);
     float eta = lf_coat.eta * lf_primer.eta;
     vec3 kept = lf_amount(lf_coat_passed, crossing3.s) * lf_amount(lf_coat_passed, crossing4.s);
+    there = lf_presence(lf_coat.eta * lf_primer.eta);
     Shares shares = lf_split(crossing3, crossing4, lf_base.alpha);
-    float part = 0.2675 + 0.5116 * shares.base * shares.base;
-    vec4 y = lf_upwards(lf_lean(crossing3, crossing3, crossing4, shares.i), lf_primer.eta);
+    float part = 0.7911 * shares.base;
+    vec4 y = lf_upwards(lf_lean(crossing3, crossing3, crossing4, there * shares.i), lf_primer.eta);
     vec3 left = lf_coat.tau + (lf_between(y, crossing, part) - 1.0) * (2.0 * lf_coat.tau / (1.0 + lf_spread_root(part * crossing.theta, lf_coat.tau)));
-    y = lf_upwards(lf_lean(crossing4, crossing3, crossing4, shares.o), lf_primer.eta);
+    y = lf_upwards(lf_lean(crossing4, crossing3, crossing4, there * shares.o), lf_primer.eta);
     left = left + (lf_coat.tau + (lf_between(y, crossing2, part) - 1.0) * (2.0 * lf_coat.tau / (1.0 + lf_spread_root(part * crossing2.theta, lf_coat.tau))));
     kept = kept * exp(-left);
     float throughput = crossing.T * crossing2.T / (lf_coat.eta * lf_coat.eta);
+    there = lf_presence(lf_coat.eta);
     shares = lf_split(crossing, crossing2, lf_primer.alpha);
-    part = 0.2675 + 0.5116 * shares.base * shares.base;
-    vec4 yi = lf_lean(crossing, crossing, crossing2, shares.i);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, shares.o);
+    part = 0.7911 * shares.base;
+    vec4 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    vec4 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_coat.tau);
@@ -369,16 +368,21 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec4 h = yi + yo;
     float h2 = dot(h, h);
     float F2 = lf_fresnel_dielectric(min(0.5 * sqrt(h2), 1.0), lf_primer.eta);
-    float rise = 1.0 + 0.468 * lf_presence(lf_coat.eta) * lf_coat.alpha * lf_coat.alpha * shares.base;
+    float rise = 1.0 + 0.3861 * there * lf_coat.alpha * lf_coat.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_coat_inner_again, crossing.s) * lf_amount(lf_coat_inner_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_primer.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_primer.alpha, lf_coat.alpha));
+    float shared_ = lf_primer.alpha * lf_primer.alpha / (lf_primer.alpha + lf_primer.alpha);
+    float t = sqrt(lf_primer.alpha * lf_primer.alpha + lf_primer.alpha * lf_primer.alpha + 3.173 * (shared_ * shared_));
+    float t2 = 0.4 * lf_coat.alpha;
+    shared_ = t * t2 / (t + t2);
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_primer.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
     vec3 root = lf_amount(lf_coat_inner_rest, crossing.s) * lf_amount(lf_coat_inner_rest, crossing2.s);
-    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_coat.eta, lf_primer.alpha);
+    vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_primer.alpha);
     throughput = crossing3.T * crossing4.T / (eta * eta);
+    there = lf_presence(eta);
     shares = lf_split(crossing3, crossing4, lf_base.alpha);
-    part = 0.2675 + 0.5116 * shares.base * shares.base;
-    vec4 yi2 = lf_lean(crossing3, crossing3, crossing4, shares.i);
-    vec4 yo2 = lf_lean(crossing4, crossing3, crossing4, shares.o);
+    part = 0.7911 * shares.base;
+    vec4 yi2 = lf_lean(crossing3, crossing3, crossing4, there * shares.i);
+    vec4 yo2 = lf_lean(crossing4, crossing3, crossing4, there * shares.o);
     path_i = lf_between(yi2, crossing3, part);
     path_o = lf_between(yo2, crossing4, part);
     root_i = lf_spread_root(part * crossing3.theta, lf_primer.tau);
@@ -388,12 +392,16 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     h = yi2 + yo2;
     float h22 = dot(h, h);
     vec3 F3 = lf_fresnel_conductor(min(0.5 * sqrt(h22), 1.0), lf_base.eta, lf_base.k);
-    rise = 1.0 + 0.468 * lf_presence(eta) * alpha * alpha * shares.base;
+    rise = 1.0 + 0.3861 * there * alpha * alpha * shares.base;
     again = F3 * (lf_amount(lf_coat_again, crossing3.s) * lf_amount(lf_coat_again, crossing4.s));
-    vec3 lobes2 = rise * lf_lobe(crossing3, crossing4, h.w, lf_base.alpha) + again * lf_lobe(crossing3, crossing4, h.w, lf_wider(lf_base.alpha, alpha));
+    shared_ = lf_base.alpha * lf_base.alpha / (lf_base.alpha + lf_base.alpha);
+    t = sqrt(lf_base.alpha * lf_base.alpha + lf_base.alpha * lf_base.alpha + 3.173 * (shared_ * shared_));
+    t2 = 0.4 * alpha;
+    shared_ = t * t2 / (t + t2);
+    vec3 lobes2 = rise * lf_lobe(crossing3, crossing4, h.w, lf_base.alpha) + again * lf_lobe(crossing3, crossing4, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
     root = lf_amount(lf_coat_rest, crossing3.s) * lf_amount(lf_coat_rest, crossing4.s);
-    vec3 rest2 = root * root * lf_ahead(crossing3, crossing4, eta, lf_base.alpha);
-    vec3 value = F * D * V + (throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_primer.alpha) * lobes) + rest) + kept * (throughput3 * (F3 * U2 * (lf_seen(yi2, yo2, h22, lf_base.alpha) * lobes2) + rest2)));
+    vec3 rest2 = root * root * lf_ahead(crossing3, crossing4, lf_base.alpha);
+    vec3 value = F * (D * V) + (throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_primer.alpha) * lobes) + rest) + kept * (throughput3 * (F3 * U2 * (lf_seen(yi2, yo2, h22, lf_base.alpha) * lobes2) + rest2)));
     return lit ? value : vec3(0.0);
 }
 

@@ -20,12 +20,22 @@ from ..layers import Coat
 from ..optics.fresnel import fresnel_dielectric
 from ..optics.microfacet import ggx_lambda
 from ..surfaces.microfacet import Conductor
-from .curves import CELLS, Nodes, absorbed, added, diffuse_return, hemispherical, interpolated, polynomial, presence
+from .curves import (
+    CELLS,
+    Nodes,
+    absorbed,
+    blurred,
+    diffuse_return,
+    hemispherical,
+    interpolated,
+    polynomial,
+    presence,
+)
 
 RINGS, SPOKES = 8, 4
 """Facets that stand for all that light from one direction meets: Gauss over its cone, even over half a turn."""
 
-AGAIN = 0.9226
+AGAIN = 0.4
 """Part of the coat's width that the lobe of light has which met the base twice: fitted to the random walk."""
 
 
@@ -41,16 +51,15 @@ class Curve:
     c5: Colour = member("")
 
 
+def wider(alpha: Scalar, coat_alpha: Scalar) -> Scalar:
+    """Width of the lobe of light that met a base of width alpha twice, and the coat in between."""
+    return blurred(blurred(alpha, alpha), AGAIN * coat_alpha)
+
+
 @chunk
 def amount(curve: Curve, s: Scalar) -> Colour:
     """The polynomial at s; an energy is never below 0."""
     return jnp.maximum(curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5)))), 0.0)
-
-
-@chunk
-def wider(alpha: Scalar, coat_alpha: Scalar) -> Scalar:
-    """Width of the lobe of light that met a base of width alpha twice, and the coat in between."""
-    return added(alpha, alpha, AGAIN * coat_alpha)
 
 
 def bounces(nodes: Nodes, alpha: Scalar, coat: Coat, base: Conductor | Coat) -> tuple[Curve, Curve]:
@@ -68,8 +77,7 @@ def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, t
     edge = safe_sqrt((eta - 1.0) * (eta + 1.0)) / eta
     cells = cells_of(edge)
     aside = 0.5 * nodes.spread / nodes.z
-    first = added(base.alpha, aside)
-    wide = added(wider(base.alpha, alpha), aside)
+    first, wide = (blurred(width, aside) for width in (base.alpha, wider(base.alpha, alpha)))
     bare = jnp.broadcast_to(base.alpha, cells.shape)
     top = jnp.broadcast_to(jnp.maximum(alpha * presence(eta), 1e-3), cells.shape)
 

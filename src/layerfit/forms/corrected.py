@@ -207,13 +207,13 @@ def _bounced(target: Lobe, below: Below, options: Corrected) -> Colour:
         wo = steer(wo, DIRECTIONAL_SHARE * below.o.drift)
     h = half_vector(wi, wo)
     F = target.reflectance(half_cosine(wi, wo))
-    q = target.energy(F) * _returned(target, below, options) * below.directional
+    q = target.energy(F) * below.directional * _returned(target, below, options)
     spread = spread_of(target, below) if options.broaden else None
     lobes: Any = 0.0
     for order in range(max(options.orders, 1), 0, -1):
         lobe = _shape(target, wi, wo, h, order, below, spread)
         lobes = lobe / jnp.maximum(1.0 - q, 1e-6) if order == options.orders else lobe + q * lobes
-    return below.throughput * below.directional * F * lobes
+    return below.throughput * (F * below.directional) * lobes
 
 
 def _shape(target: Lobe, wi: Direction, wo: Direction, h: Direction, order: int, below: Below, spread: Width | None) -> Any:

@@ -5,8 +5,7 @@ functions of one cosine, as polynomials. Both steps are smooth in index and widt
 """
 
 import dataclasses
-from functools import cache, reduce
-from operator import add
+from functools import cache
 from typing import Any
 
 import jax
@@ -15,7 +14,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from .._chunk import chunk, clip, member, safe_divide, safe_power, safe_sqrt, struct, where
+from .._chunk import chunk, clip, member, safe_divide, safe_sqrt, struct, where
 from .._types import Colour, Scalar, Vec2, Vec4
 from ..optics.interface import facet_tilt, rough_transmittance, second_facet
 from . import tables
@@ -39,13 +38,10 @@ TAUS = (0.25, 2.0)
 GAUSS = 8
 """Nodes of the quadrature of diffuse light, inside and outside of the edge of total reflection each."""
 
-STEER = 1.032
-"""Share of the tables' turn of the mean direction."""
+BOTH = 3.173
+"""How far widths add beyond their squares: the tails of GGX are longer than a Gaussian's, whose squares add."""
 
-P = 1.41
-"""Widths add as powers."""
-
-WIDTH = 1.119
+WIDTH = 0.899
 """Width of a GGX lobe with the spread of the tables, over that spread."""
 
 
@@ -108,19 +104,15 @@ def curve(low: Vec4, high: Vec2, s: Scalar) -> Scalar:
     return low[0] + s * (low[1] + s * (low[2] + s * (low[3] + s * (high[0] + s * high[1]))))
 
 
-def power(width: Any) -> Any:
-    """A width as the power in which widths add."""
-    return safe_power(width, P)
+def blurred2(width: Any, spread: Any) -> Any:
+    """The squared width of a lobe of this width, seen by way of slopes that spread it."""
+    shared = safe_divide(width * spread, width + spread)
+    return width * width + spread * spread + BOTH * (shared * shared)
 
 
-def squared(powers: Any) -> Any:
-    """The square of a width, from the sum of such powers."""
-    return safe_power(powers, 2.0 / P)
-
-
-def added(*widths: Any) -> Any:
-    """What several widths make together."""
-    return safe_power(reduce(add, map(power, widths)), 1.0 / P)
+def blurred(width: Any, spread: Any) -> Any:
+    """Its width."""
+    return safe_sqrt(blurred2(width, spread))
 
 
 @chunk
@@ -149,13 +141,11 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     mu = jnp.asarray(baked.mu, dtype)
     sin2 = (1.0 - mu) * (1.0 + mu)
     # As a part of itself by which the sine changes, not as what is left of it: where the indices match that has no digit of the change.
-    bend = smaller(eta, STEER * turn)
+    bend = smaller(eta, turn)
     z = _below(mu, sin2, bend)
     spread = WIDTH * w
-    # The path of the tables is that of their own direction.
-    longer = path * z / _below(mu, sin2, smaller(eta, turn))
     hidden = dT * clip((eta - 1.0) / MASKED, 0.0, 1.0)
-    rows = (hidden, bend, spread, longer, theta)
+    rows = (hidden, bend, spread, path, theta)
     curves = [part for row in rows for part in parts(polynomial(row))]
     rough = where(alpha > 1.0, 1.0, alpha)  # not min: at 1 its derivative is half of either side's
     tilt, gain = facet_tilt(rough), second_facet(rough)
@@ -165,10 +155,10 @@ def _bake(eta: Scalar, alpha: Scalar, kind: Kind) -> tuple[Interface, Nodes]:
     weights = 2.0 * (jnp.asarray(baked.quadrature, dtype) @ R) * cosines * widths
     nodes = Nodes(
         z,
-        STEER * turn,
+        turn,
         T,
         spread * alpha,
-        jnp.maximum(longer, 1.0) / z,
+        jnp.maximum(path, 1.0) / z,
         jnp.maximum(theta, 0.0),
         jnp.asarray(baked.cells, dtype) @ R,
         cosines,

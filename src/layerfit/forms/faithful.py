@@ -100,12 +100,13 @@ def _coat_over(
         wi_below = refract_about_normal(wi, coat.eta)
         wo_below = refract_about_normal(wo, coat.eta)
     if options.fresnel_at == "h":
-        T12 = coat.transmittance(c)
-        T21 = T12
+        T12 = T21 = coat.transmittance(c)
+        R21 = F
     else:
         T12 = coat.transmittance(wi[-1])
         T21 = coat.transmittance(wo[-1])
-    t = 1.0 - G * (1.0 - T21) if options.masked else T21
+        R21 = 1.0 - T21
+    t = 1.0 - G * R21 if options.masked else T21
     rest = T12 * t * _evaluate(below, base, wi_below, wo_below, half, options)
     if coat.tau is not None:
         at_h = half_cosine(wi_below, wo_below) if half is None else half[1]

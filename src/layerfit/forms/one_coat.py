@@ -22,24 +22,24 @@ from ..optics.interface import facet_cosine, rough_transmittance
 from ..optics.microfacet import Width, visibility
 from .axes import Widths, area, even_width, over_axes, stretched, tops, towards, widths
 from .bounces import Curve, amount, bounces, wider
-from .curves import Interface, curve, depth, diffuse_return, grazing, power, presence, spread_root, squared
+from .curves import Interface, blurred2, curve, depth, diffuse_return, grazing, presence, spread_root
 from .tables import Kind
 
 HELD = ("interface", "again", "rest", "across")
 """Parts of a prepared material that a shader holds as constants, also where its other numbers can be set."""
 
-CONDENSE = 1.099
+CONDENSE = 0.8241
 """Share of the tilt of the facets that the base does not ask for, which the two crossings take."""
-RISE = 0.468
+RISE = 0.3861
 """Growth of the first lobe with the coat's roughness."""
-RATIO, TAIL = 0.2559, 0.3109
+RATIO, TAIL = 0.3431, 0.8294
 """How a lobe that was widened differs from GGX: less peaked, with a longer tail."""
 BECKMANN = 0.6
 """Width of the GGX facets that treat light which crosses as Beckmann facets of width 1 do: their slopes are less spread."""
 LEAST_Z2 = 4e-4
 """Squared cosine below which no light is turned."""
-DIRECT = (0.2675, 0.5116)
-"""Part of the path's spread that counts, by the share w of the base in the lobe's width: d + c w^2."""
+DIRECT = 0.7911
+"""Part of the path's spread that counts, over the base's share of the lobe's width."""
 
 
 @struct
@@ -69,6 +69,7 @@ class Crossing:
     path: Scalar = member("mean path, in thicknesses")
     theta: Scalar = member("scale of the path's distribution")
     s: Scalar = member("argument of the baked curves")
+    air: Direction = member("direction above")
 
 
 @struct
@@ -125,10 +126,12 @@ def below(i: Crossing, o: Crossing, prepared: Prepared) -> Colour:
         return throughput * base.evaluate(i.w, o.w) / jnp.maximum(1.0 - base.albedo * prepared.returned, 1e-6)
     alpha = crossed(coat)
     top, own = widths(alpha), widths(base.width)
+    # Where the indices match there is no interface, and nothing of what it does.
+    there = presence(coat.eta)
     shares = split(i, o, own)
     share = over_axes(shares.base)
-    part = direct(share)
-    yi, yo = lean(i, i, o, shares.i), lean(o, i, o, shares.o)
+    part = DIRECT * share
+    yi, yo = lean(i, i, o, there * shares.i), lean(o, i, o, there * shares.o)
     path_i, path_o = between(yi, i, part), between(yo, o, part)
     if tau is None:
         U: Any = path_i * path_o
@@ -139,24 +142,26 @@ def below(i: Crossing, o: Crossing, prepared: Prepared) -> Colour:
     h = yi + yo
     h2 = dot(h, h)
     F = base.reflectance(jnp.minimum(0.5 * jnp.sqrt(h2), 1.0))
-    # Where the indices match there is no interface, and nothing of what it does.
     even = even_width(alpha)
-    rise = 1.0 + RISE * presence(coat.eta) * even * even * share
+    rise = 1.0 + RISE * there * even * even * share
     wide, left = prepared.again, prepared.rest
     assert wide is not None
     assert left is not None
     again = F * (amount(wide, i.s) * amount(wide, o.s))
     lobes = rise * lobe(i, o, h[-1], own) + again * lobe(i, o, h[-1], wider(own, top))
     root = amount(left, i.s) * amount(left, o.s)
-    rest = root * root * ahead(i, o, coat.eta, even_width(base.width))
+    rest = root * root * ahead(i, o, even_width(base.width))
     return throughput * (F * U * (seen(yi, yo, h2, own) * lobes) + rest)
 
 
 @chunk
-def ahead(i: Crossing, o: Crossing, eta: Scalar, alpha: Scalar) -> Scalar:
+def ahead(i: Crossing, o: Crossing, alpha: Scalar) -> Scalar:
     """What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base."""
-    back = eta * eta * dot(along(i.w), along(o.w))
-    return jnp.maximum(1.0 - (1.0 - jnp.minimum(alpha, 1.0)) * back, 0.0) / jnp.pi
+    # 1 - sin sin cos(phi), by the difference of both directions: the product itself has no digits of what is left where light goes back.
+    apart = along(i.air) - along(o.air)
+    back = 0.5 * (dot(apart, apart) + i.air[-1] * i.air[-1] + o.air[-1] * o.air[-1])
+    own = jnp.minimum(alpha, 1.0)
+    return (own + (1.0 - own) * back) / jnp.pi
 
 
 @chunk
@@ -171,7 +176,7 @@ def pass_interface(interface: Interface, eta: Scalar, alpha: Widths, w: Directio
     a = jnp.maximum(curve(interface.spread, interface.spread_high, s), 0.0) * alpha
     path = jnp.maximum(curve(interface.path, interface.path_high, s), 1.0) / z
     theta = jnp.maximum(curve(interface.theta, interface.theta_high, s), 0.0)
-    return Crossing(direction(along(w) * (1.0 - bend), z), T, a, path, theta, s)
+    return Crossing(direction(along(w) * (1.0 - bend), z), T, a, path, theta, s, w)
 
 
 @chunk
@@ -184,14 +189,9 @@ def between(y: Direction, x: Crossing, part: Scalar) -> Scalar:
 @chunk
 def split(i: Crossing, o: Crossing, alpha: Widths) -> Shares:
     """What the width of a lobe is due to."""
-    base, first, second = power(alpha * (i.w[-1] + o.w[-1])), power(i.a), power(o.a)
-    inverse = 1.0 / (base + first + second)
-    return Shares(base * inverse, first * inverse, second * inverse)
-
-
-def direct(share: Scalar) -> Scalar:
-    """Part of the path's spread that counts, by the base's share of the width."""
-    return DIRECT[0] + DIRECT[1] * share * share
+    base = alpha * (i.w[-1] + o.w[-1])
+    inverse = 1.0 / (base + i.a + o.a)
+    return Shares(base * inverse, i.a * inverse, o.a * inverse)
 
 
 @chunk
@@ -211,11 +211,11 @@ def lobe(i: Crossing, o: Crossing, M: Scalar, alpha: Widths) -> Scalar:
     Without an interface it is D of GGX over the square of M.
     """
     base = alpha * M
-    width2 = squared(power(base) + (power(i.a) + power(o.a)))
+    width2 = blurred2(base, i.a + o.a)
     size = area(width2)
     x = RATIO * (size / area(base * base + TAIL * (i.a * i.a + o.a * o.a)) - 1.0)
-    v = stretched(along(i.w) + along(o.w), width2)
-    return 1.0 / (jnp.pi * size * (1.0 + v * (middle(x) + (1.0 + x) * v)))
+    v = stretched(along(i.w) + along(o.w), width2, size)
+    return size / (jnp.pi * (size * size + v * (middle(x) * size + (1.0 + x) * v)))
 
 
 def middle(x: Any) -> Any:

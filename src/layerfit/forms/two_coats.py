@@ -25,8 +25,8 @@ from .curves import (
     Interface,
     Nodes,
     absorbed,
-    added,
     bake,
+    blurred,
     curve,
     depth,
     diffuse_return,
@@ -38,7 +38,7 @@ from .curves import (
     smaller,
     spread_root,
 )
-from .one_coat import Crossing, between, direct, lean, pass_interface, split
+from .one_coat import DIRECT, Crossing, between, lean, pass_interface, split
 from .tables import Kind
 
 HELD = ("top", "both", "passed", "inner_again", "inner_rest", "returned", "again", "rest")
@@ -157,11 +157,11 @@ def absorbed_above(i1: Crossing, o1: Crossing, i: Crossing, o: Crossing, prepare
     (outer, inner), base = prepared.coats, prepared.base
     if not base.lobes:
         return absorbed(i1.path, i1.theta, outer.tau) * absorbed(o1.path, o1.theta, outer.tau)
-    shares = split(i, o, base.alpha)
-    part = direct(shares.base)
+    there, shares = presence(outer.eta * inner.eta), split(i, o, base.alpha)
+    part = DIRECT * shares.base
     left: Any = 0.0
     for x, x1, share in ((i, i1, shares.i), (o, o1, shares.o)):
-        y = upwards(lean(x, i, o, share), inner.eta)
+        y = upwards(lean(x, i, o, there * share), inner.eta)
         left = left + depth(between(y, x1, part), spread_root(part * x1.theta, outer.tau), outer.tau)
     return jnp.exp(-left)
 
@@ -198,7 +198,7 @@ def _into(top: _Top, eta: Scalar, w: Direction) -> Crossing:
     widens = top.eta * top.eta * steepness(w2[-1]) / steepness(up.w[-1])
     path = 1.0 / w2[-1] + widens * (up.path - 1.0 / up.w[-1])
     theta = up.theta * jnp.minimum(widens, STEEPEST)
-    turned = Crossing(w2, up.T, top.eta * up.a, jnp.minimum(path, STEEPEST), theta, up.s)
+    turned = Crossing(w2, up.T, top.eta * up.a, jnp.minimum(path, STEEPEST), theta, up.s, w)
     return jax.tree.map(lambda x, y: where(eta >= 1.0, x, y), down, turned)
 
 
@@ -213,9 +213,8 @@ def _after(a: Crossing, b: Crossing, eta: Scalar) -> Crossing:
     before = (a.path - 1.0 / a.w[-1]) * k
     own = jnp.maximum(b.path - 1.0 / b.w[-1], 0.0)
     theta = (own * b.theta + before * a.theta * k) / jnp.maximum(own + before, 1e-6)
-    spread = added(a.a / eta, b.a)
     path = 1.0 / b.w[-1] + held(own + before)
-    return Crossing(b.w, a.T, spread, path, held(theta), a.s)
+    return Crossing(b.w, a.T, blurred(a.a / eta, b.a), path, held(theta), a.s, a.air)
 
 
 def held(x: Scalar) -> Scalar:
@@ -225,10 +224,13 @@ def held(x: Scalar) -> Scalar:
 
 def _composed(first: _Top, second: _Top, way: tuple[Any, Crossing, Crossing, Crossing], n: Scalar) -> Interface:
     """Curves of the whole way to the medium of index n, to be read like those of one top: for the outer coat's index and a width of 1."""
-    _, a, b, x = way
+    w, a, b, x = way
     # What both add to Snell's law: as the ratio of two sines it would have no digits where n is that of air.
     turn_a, turn_b = first.turns(a.s), second.turns(b.s)
-    held = jnp.minimum(WIDEST_SINE / (second.eta * a.w[:, 0]) - 1.0, 0.0)
+    # So is the sine in a rarer inner coat, and how far it is from that of light along the surface.
+    sine, more = w[:, 0], (second.eta - first.eta) / first.eta
+    past = more + (1.0 + more) * (turn_a * sine - w[:, 2] * w[:, 2] / (1.0 + sine))
+    held = jnp.minimum((WIDEST_SINE - 1.0 - past) / (1.0 + past), 0.0)
     turn_b = where(n >= first.eta, turn_b, held)
     rows = {
         "bend": smaller(n, turn_a + turn_b + turn_a * turn_b),

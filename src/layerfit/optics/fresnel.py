@@ -51,7 +51,7 @@ def fresnel_conductor(c: Scalar, eta: Colour, k: Colour) -> Colour:
     # a = sqrt((q + p) / 2) cancels where p < 0, as in every metal; there b = sqrt((q - p) / 2) does not and a = nk / b.
     larger = jnp.sqrt(0.5 * (q + jnp.abs(p)))
     a = where(p < 0.0, nk / larger, larger)
-    twice_ac = 2.0 * a * c
+    twice_ac = a * (2.0 * c)
     # Rp is Rs (even - odd) / (even + odd), so that the mean of both is Rs even / (even + odd).
     even = q * c2 + s2 * s2
     odd = twice_ac * s2

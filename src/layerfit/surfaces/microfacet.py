@@ -50,7 +50,7 @@ class Microfacets(Surface, Lobe):
         F = self.reflectance(half_cosine(wi, wo))
         D = self.density(half_vector(wi, wo))
         V = self.visibility(wi, wo)
-        return F * D * V
+        return F * (D * V)
 
 
 def alpha_param(*, default: float | None, which: str) -> Any:

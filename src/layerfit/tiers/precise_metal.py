@@ -11,7 +11,7 @@ from .._chunk import chunk, member, static, struct
 from .._types import Colour, Scalar, Vec2
 from ..forms import one_coat
 from ..forms.bounces import amount, wider
-from ..forms.curves import curve, grazing, power, presence, spread_root, squared
+from ..forms.curves import blurred2, curve, grazing, presence, spread_root
 from ..layers import Coat
 from ..optics.interface import rough_transmittance
 from .polynomial import Curve, Polynomial
@@ -30,8 +30,7 @@ class PreciseWay:
     bend: Scalar = member("sine below over that above")
     z2: Scalar = member("squared cosine below")
     z: Scalar = member("cosine below")
-    spread: Scalar = member("spread as a width, to the power in which widths add")
-    tail: Scalar = member("its square, times its part in a lobe's tail")
+    spread: Scalar = member("spread as a width")
     path: Scalar = member("mean path, in thicknesses")
     theta: Scalar = member("scale of the path's distribution")
     rest: Colour = member("fourth root of what leaves of the light that goes to and fro")
@@ -52,23 +51,19 @@ class PreciseMetal(Compact):
     rest: Polynomial
     """Of `grazing`: fourth root of the light that is left, and what the energy is beyond the closed form."""
     again: Polynomial
-    """Of `grazing`: factor of the weight of the second lobe, and the spread of the tail."""
+    """Of `grazing`: factor of the weight of the second lobe."""
     absorbing: Polynomial | None
     """Of theta: optical depth that counts."""
     unspread: Polynomial | None
     """Of theta: one over `spread_root`."""
     reflectance: Polynomial
     """Of four times the squared half cosine below."""
-    own: Polynomial
-    """Of the sum of the cosines below: it to the power in which widths add."""
-    variance: Polynomial
-    """Of the widths that a lobe is made of, to that power, together: its squared width."""
     widths: Vec2
-    """Width of the metal's facets, and of those that stand for two meetings, to that power."""
-    alpha2: Vec2
-    """Their squares."""
+    """Width of the metal's facets, and of those that stand for two meetings."""
     least: Scalar
     """Squared cosine below which no light is turned."""
+    condense: Scalar
+    """Share of the tilt of the facets, of what the metal does not ask for, that both crossings take."""
     rise: Scalar
     """Growth of the first lobe."""
     ahead: Scalar
@@ -80,15 +75,15 @@ class PreciseMetal(Compact):
         return precise_way(self.passed, self.bent, self.rest, self.again, self.coat, self.tilt, NoW)
 
     def meet(self, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> Colour:
-        between = metal_between(self.own, self.widths, self.least, i, o, lean2)
-        lobes = metal_lobes(self.own, self.variance, self.widths, self.alpha2, i, o, between)
+        between = metal_between(self.widths, self.condense, self.least, i, o, lean2)
+        lobes = metal_lobes(self.widths, i, o, between)
         F = self.reflectance(between.h2)
         again = F * (i.again * o.again) * lobes[1]
         rise = 1.0 + self.rise * between.share
-        back = i.bend * o.bend * (lean2 - i.sin2 - o.sin2)
+        back = lean2 - i.sin2 - o.sin2
         root = i.rest * o.rest
         rest = root * root * jnp.maximum(1.0 / math.pi - self.ahead * back, 0.0)
-        part = one_coat.direct(between.share)
+        part = one_coat.DIRECT * between.share
         path_i = (between.inverse_i - 1.0) + part * (i.path - between.inverse_i)
         path_o = (between.inverse_o - 1.0) + part * (o.path - between.inverse_o)
         throughput: Any = i.T * o.T
@@ -127,7 +122,6 @@ def precise_way(
     sin2 = 1.0 - NoW2
     crossing = bent(s)
     left = rest(s)
-    second = again(s)
     T = passed(jnp.sqrt(tilt + (1.0 - tilt) * NoW2)) + left[-1]
     bend = crossing[0]
     z2 = NoW2 + (1.0 - bend * bend) * sin2
@@ -143,22 +137,21 @@ def precise_way(
         z2,
         z2 * inverse,
         crossing[1],
-        second[-1],
         path,
         crossing[3],
         colour_of(left),
-        colour_of(second),
+        again(s),
     )
 
 
 @chunk
-def metal_between(own: Polynomial, widths: Vec2, least: Scalar, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> MetalBetween:
+def metal_between(widths: Vec2, condense: Scalar, least: Scalar, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> MetalBetween:
     """Turn two directions towards the mirror direction, each by the share of its spread in the width of the lobe."""
     bends = i.bend - o.bend
     x2 = jnp.maximum(i.bend * o.bend * lean2 + bends * (i.bend * i.sin2 - o.bend * o.sin2), 0.0)
-    base = widths[0] * own(i.z + o.z)
+    base = widths[0] * (i.z + o.z)
     inverse = 1.0 / (base + i.spread + o.spread)
-    turns = one_coat.CONDENSE * inverse
+    turns = condense * inverse
     turn_i, turn_o = turns * i.spread, turns * o.spread
     apart = o.z2 - i.z2
     z2_i = jnp.maximum(i.z2 + turn_i * (apart + (1.0 - turn_i) * x2), least)
@@ -172,14 +165,14 @@ def metal_between(own: Polynomial, widths: Vec2, least: Scalar, i: PreciseWay, o
 
 
 @chunk
-def metal_lobes(
-    own: Polynomial, variance: Polynomial, widths: Vec2, alpha2: Vec2, i: PreciseWay, o: PreciseWay, between: MetalBetween
-) -> Vec2:
+def metal_lobes(widths: Vec2, i: PreciseWay, o: PreciseWay, between: MetalBetween) -> Vec2:
     """D G / 4 of light that met the metal once, and of light that met it twice: two lobes at once."""
-    size = variance(widths * own(between.M) + (i.spread + o.spread))
-    x = one_coat.RATIO * (size / (alpha2 * (between.M * between.M) + (i.tail + o.tail))) - one_coat.RATIO
+    base = widths * between.M
+    size = blurred2(base, i.spread + o.spread)
+    tail = one_coat.TAIL * (i.spread * i.spread + o.spread * o.spread)
+    x = one_coat.RATIO * (size / (base * base + tail)) - one_coat.RATIO
     shapes = size / (size * size + between.x2 * (one_coat.middle(x) * size + (1.0 + x) * between.x2))
-    hidden_i, hidden_o = hidden_cosine(between.z_i, alpha2[0]), hidden_cosine(between.z_o, alpha2[0])
+    hidden_i, hidden_o = (hidden_cosine(z, widths[0] * widths[0]) for z in (between.z_i, between.z_o))
     slope = between.h2 / between.M
     seen = between.z_i * between.z_o / (between.z_o * hidden_i + between.z_i * hidden_o)
     return ((0.5 / math.pi) * (slope * slope) * seen) * shapes
@@ -202,30 +195,22 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
         return (
             s,
             z,
-            jnp.stack([jnp.minimum(bend, 1.0), power(crossing.a), crossing.path * z, crossing.theta]),
+            jnp.stack([jnp.minimum(bend, 1.0), crossing.a, crossing.path * z, crossing.theta]),
             jnp.hstack([amount(rest, s), beyond]),
-            jnp.hstack([amount(again, s), one_coat.TAIL * crossing.a * crossing.a]),
+            amount(again, s),
         )
 
     NoW = cosines()
     s, z, bent, left, second = (np.asarray(a) for a in jax.vmap(follow)(jnp.asarray(NoW)))
     facet = np.sqrt(tilt + (1.0 - tilt) * NoW**2)
     closed = np.asarray(jax.vmap(lambda c: rough_transmittance(c, eta, interface.gain))(jnp.asarray(facet))) / eta
-    theta = np.linspace(0.0, bent[:, 3].max() * sum(one_coat.DIRECT), len(NoW))
+    theta = np.linspace(0.0, bent[:, 3].max() * one_coat.DIRECT, len(NoW))
     cosine = np.linspace(0.98 * z.min(), 1.0, len(NoW))
-    alphas = jnp.stack([base.width, wider(base.width, coat.width)])
-    widths = power(alphas)
-    M = np.linspace(1.96 * z.min(), 2.0, len(NoW))
-    raised, spread = np.asarray(power(jnp.asarray(M))), bent[:, 1]
-    total = np.linspace(widths[0] * raised[0] + 2.0 * spread.min(), widths[1] * raised[-1] + 2.0 * spread.max(), len(NoW))
-    size = np.asarray(squared(jnp.asarray(total)))
     curves = {
         "passed": Curve(facet, closed, 1.0 / closed),
         "bent": Curve(s, bent, np.broadcast_to(1.0 / bent.max(0), bent.shape)),
         "rest": Curve(s, left),
         "again": Curve(s, second),
-        "own": Curve(M, raised, 1.0 / raised, 4),
-        "variance": Curve(total, size, 1.0 / size, 5),
         "reflectance": reflectance_curve(base, cosine, 6),
     }
     if coat.tau is not None:
@@ -235,18 +220,18 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
             "unspread": Curve(theta, 1.0 / root, 1.0, 5),
         }
     least = jnp.asarray(min(one_coat.LEAST_Z2, z.min() ** 2))
-    rise = one_coat.RISE * presence(eta) * coat.alpha * coat.alpha
-    ahead = 0.5 / math.pi * eta * eta * (1.0 - jnp.minimum(base.width, 1.0))
+    there = presence(eta)
+    ahead = 0.5 / math.pi * (1.0 - jnp.minimum(base.width, 1.0))
 
     def build(p: Any) -> PreciseMetal:
         absorption = {"absorbing": None, "unspread": None}
         return PreciseMetal(
             coat=coat,
             tilt=tilt,
-            widths=widths,
-            alpha2=alphas * alphas,
+            widths=jnp.stack([base.width, wider(base.width, coat.width)]),
             least=least,
-            rise=rise,
+            condense=one_coat.CONDENSE * there,
+            rise=one_coat.RISE * there * coat.alpha * coat.alpha,
             ahead=ahead,
             name=name,
             **(absorption | p),
