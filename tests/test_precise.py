@@ -16,6 +16,7 @@ from layerfit.forms.precise import Precise, refuses
 from layerfit.layers import Coat
 from layerfit.optics.interface import facet_cosine, facet_tilt, rough_transmittance, second_facet
 from layerfit.preset import preset_of, stack_of
+from layerfit.render import brdf
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Dielectric, Lambert, OrenNayar
 from layerfit.walk import walk_rows
@@ -416,3 +417,16 @@ def test_grazing_light_near_index_1_has_its_digits(indices, digits):
     with jax.enable_x64(False):
         found = np.asarray(brdf_rows(stack, wi, wo))
     np.testing.assert_allclose(found, brdf_rows(*double), rtol=digits)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.5])
+def test_the_narrowest_lobes_have_derivatives_in_single_precision(eta):
+    """Their squared width at grazing angles is some 1e-14, and the square of that, by which a quotient is differentiated, is next to 0."""
+    stack = Stack((Coat(alpha=1e-3, eta=eta, tau=0.1),), Conductor(alpha=1e-3, eta=0.2, k=3.5), Precise()).astype(np.float32)
+    theta = np.radians([0.0, 60.0, 89.0, 89.9, 89.99])
+    wi = np.stack([np.sin(theta), 0.0 * theta, np.cos(theta)], -1).astype(np.float32)
+    with jax.enable_x64(False):
+        along = jax.tree.map(jnp.ones_like, stack)
+        f, slope = jax.jvp(lambda stack: brdf(stack, wi, wi * np.float32([-1, -1, 1])), (stack,), (along,))
+    assert np.all(np.isfinite(f))
+    assert np.all(np.isfinite(slope))

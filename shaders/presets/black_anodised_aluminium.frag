@@ -299,8 +299,8 @@ float lf_lobe(Crossing i, Crossing o, float M, vec2 alpha) {
     t = base * base + 0.8294 * (i.a * i.a + o.a * o.a);
     float x = 0.3431 * (size / sqrt(t.x * t.y) - 1.0);
     t = i.w.xy + o.w.xy;
-    float v = size * (t.x * t.x / width2.x + t.y * t.y / width2.y);
-    return size / (3.1415927 * (size * size + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * size + (1.0 + x) * v)));
+    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
+    return 1.0 / (3.1415927 * size * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.

@@ -252,8 +252,8 @@ float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
     vec3 t2 = i.w.xyz + o.w.xyz;
-    float v = dot(t2, t2);
-    return width2 / (3.1415927 * (width2 * width2 + v * ((2.0 - x * (1.986 - x * (0.668 - 0.1745 * x))) * width2 + (1.0 + x) * v)));
+    float v = dot(t2, t2) / width2;
+    return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.

@@ -38,9 +38,9 @@ def area(squares: Widths) -> Scalar:
     return safe_sqrt(squares[0] * squares[1]) if jnp.ndim(squares) else squares
 
 
-def stretched(x: jax.Array, squares: Widths, size: Scalar) -> Scalar:
-    """Squared distance along the surface, in widths of which the squares are given, times `size`, their `area`."""
-    return size * (x[0] * x[0] / squares[0] + x[1] * x[1] / squares[1]) if jnp.ndim(squares) else dot(x, x)
+def stretched(x: jax.Array, squares: Widths) -> Scalar:
+    """Squared distance in widths along the surface, from squares of the widths."""
+    return x[0] * x[0] / squares[0] + x[1] * x[1] / squares[1] if jnp.ndim(squares) else dot(x, x) / squares
 
 
 def tops(eta: Scalar, width: Width, kind: Kind) -> tuple[Interface, Interface | None, Nodes]:

@@ -214,8 +214,8 @@ def lobe(i: Crossing, o: Crossing, M: Scalar, alpha: Widths) -> Scalar:
     width2 = blurred2(base, i.a + o.a)
     size = area(width2)
     x = RATIO * (size / area(base * base + TAIL * (i.a * i.a + o.a * o.a)) - 1.0)
-    v = stretched(along(i.w) + along(o.w), width2, size)
-    return size / (jnp.pi * (size * size + v * (middle(x) * size + (1.0 + x) * v)))
+    v = stretched(along(i.w) + along(o.w), width2)
+    return 1.0 / (jnp.pi * size * (1.0 + v * (middle(x) + (1.0 + x) * v)))
 
 
 def middle(x: Any) -> Any:
