@@ -271,7 +271,7 @@ def test_sigmas_say_what_they_are_of(clean):
 def test_a_result_shows_itself(clean):
     text = repr(clean)
     assert text.startswith("Coat over Conductor; converged: yes, after ")
-    assert "flags: none" in text
+    assert f"flags: {', '.join(document(clean)['flags']) or 'none'}\n" in text
     assert len(text.splitlines()) == 1 + len(values(clean))
     page = clean._repr_html_()
     for name, row in document(clean)["parameters"].items():
