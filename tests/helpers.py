@@ -10,7 +10,7 @@ import functools
 import json
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -121,6 +121,11 @@ def brdf_rows(stack: Stack, wi: Any, wo: Any) -> Any:
     prepared = stack.prepare()
     one = lambda i, o: jnp.broadcast_to(evaluate(stack.form, prepared, i, o), (3,))  # noqa: E731
     return jax.vmap(one)(jnp.asarray(wi), jnp.asarray(wo))
+
+
+def with_slope(fn: Callable[[Stack], Any], stack: Stack) -> Any:
+    """A function of a material, and its derivative along all of its numbers at once."""
+    return jax.jit(lambda s: jax.jvp(fn, (s,), (jax.tree.map(jnp.ones_like, s),)))(stack)
 
 
 def direction(theta_deg: float, phi_deg: float = 0.0) -> np.ndarray:

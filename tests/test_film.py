@@ -11,7 +11,20 @@ import mpmath
 import numpy as np
 import pytest
 
-from helpers import COPPER, FLOOR, brdf, brdf_rows, cases, close, compiles, direction, hemisphere, sphere_view, varnish
+from helpers import (
+    COPPER,
+    FLOOR,
+    brdf,
+    brdf_rows,
+    cases,
+    close,
+    compiles,
+    direction,
+    hemisphere,
+    sphere_view,
+    varnish,
+    with_slope,
+)
 from layerfit.errors import InputError
 from layerfit.fit.fit import fit
 from layerfit.fit.result import parameters
@@ -302,8 +315,7 @@ def test_a_material_with_a_film_is_finite_in_single_precision():
     stack = FILMED["on metal"].astype(np.float32)
     edge = np.array([direction(t, p) for t, p in [(0, 0), (89.99, 0), (89.99, 180), (45, 0), (45, 180)]], np.float32)
     wi, wo = np.repeat(edge, len(edge), 0), np.tile(edge, (len(edge), 1))
-    along = jax.jit(lambda s: jax.jvp(lambda s: brdf_rows(s, wi, wo), (s,), (jax.tree.map(jnp.ones_like, s),)))
-    values, slopes = along(stack)
+    values, slopes = with_slope(lambda s: brdf_rows(s, wi, wo), stack)
     assert np.all(np.isfinite(values))
     assert np.all(np.isfinite(slopes))
 

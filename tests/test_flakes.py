@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from helpers import COPPER, FLOOR, REL, STACKS, cases, close, direction, hemisphere, varnish
+from helpers import COPPER, FLOOR, REL, STACKS, cases, close, direction, hemisphere, varnish, with_slope
 from layerfit._place import Place
 from layerfit.errors import InputError
 from layerfit.forms.corrected import Corrected
@@ -128,8 +128,7 @@ def test_values_and_derivatives_of_a_flake_are_finite_at_the_edges(stack, dtype)
     ends = [(up, up), (grazing, up), (grazing, grazing), (grazing, direction(89.9999, 180.0)), (up, -up)]
     wi, wo = (jnp.asarray([e[k] for e in ends * 3], dtype) for k in (0, 1))
     place = Place(np.full((15, 2), 0.37), np.repeat([0.0, 1.0, 1e8], 5))
-    along = jax.jit(lambda s: jax.jvp(lambda s: brdf(s, wi, wo, place), (s,), (jax.tree.map(jnp.ones_like, s),)))
-    value, slope = along(stack)
+    value, slope = with_slope(lambda s: brdf(s, wi, wo, place), stack)
     assert np.all(np.isfinite(value))
     assert np.all(np.isfinite(slope))
 

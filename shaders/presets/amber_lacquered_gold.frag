@@ -88,21 +88,21 @@ const Conductor lf_gold = Conductor(
 );
 
 const Curve lf_shellac_again = Curve(
-    vec3(0.4100702, 0.36309206, 0.25376877),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.016594969, -0.014080994, -0.0085702315),  // c1: 
-    vec3(0.05046641, 0.04569278, 0.030768223),        // c2: 
-    vec3(0.0075026453, 0.005961269, 0.0017187893),    // c3: 
-    vec3(-0.12749544, -0.11129023, -0.07341422),      // c4: 
-    vec3(-0.108046174, -0.0935376, -0.05992484)       // c5: 
+    vec3(0.41007018, 0.36309212, 0.25376877),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.01659526, -0.014081068, -0.008570328),  // c1: 
+    vec3(0.05046647, 0.045692608, 0.030768126),     // c2: 
+    vec3(0.0075036287, 0.005961776, 0.0017192066),  // c3: 
+    vec3(-0.12749568, -0.11129018, -0.07341421),    // c4: 
+    vec3(-0.10804671, -0.093538105, -0.05992514)    // c5: 
 );
 
 const Curve lf_shellac_rest = Curve(
-    vec3(0.93964374, 0.62593496, 0.29271707),     // c0: coefficients of the powers of the curves' argument
-    vec3(-0.070628, -0.047082894, -0.02261091),   // c1: 
-    vec3(0.025602698, 0.014387652, 0.005096175),  // c2: 
-    vec3(0.02739495, 0.017852962, 0.011185825),   // c3: 
-    vec3(-0.18329307, -0.12210268, -0.06094294),  // c4: 
-    vec3(-0.19600588, -0.13269156, -0.06896056)   // c5: 
+    vec3(0.93964374, 0.62593496, 0.29271707),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.07062812, -0.047083035, -0.022610817),  // c1: 
+    vec3(0.025602818, 0.014387742, 0.0050962716),   // c2: 
+    vec3(0.027395368, 0.017853737, 0.011185497),    // c3: 
+    vec3(-0.18329307, -0.12210287, -0.060942978),   // c4: 
+    vec3(-0.19600582, -0.13269192, -0.06896025)     // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -244,16 +244,31 @@ vec3 lf_amount(Curve curve, float s) {
     return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
 }
 
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+float lf_blurred2(float width, float spread) {
+    float shared_ = width * spread / max(width + spread, 1e-14);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float t = i.a + o.a;
-    float shared_ = base * t / max(base + t, 1e-14);
-    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float width2 = lf_blurred2(base, i.a + o.a);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t2 = i.w.xyz + o.w.xyz;
-    float v = dot(t2, t2) / width2;
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
+}
+
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+float lf_blurred22(float width, float spread) {
+    float shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+float lf_wider(float alpha, float coat_alpha) {
+    return sqrt(lf_blurred22(sqrt(lf_blurred22(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -299,11 +314,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_gold.eta, lf_gold.k);
     float rise = 1.0 + 0.3861 * there * lf_shellac.alpha * lf_shellac.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_shellac_again, crossing.s) * lf_amount(lf_shellac_again, crossing2.s));
-    float shared_ = lf_gold.alpha * lf_gold.alpha / (lf_gold.alpha + lf_gold.alpha);
-    float t = sqrt(lf_gold.alpha * lf_gold.alpha + lf_gold.alpha * lf_gold.alpha + 3.173 * (shared_ * shared_));
-    float t2 = 0.4 * lf_shellac.alpha;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_gold.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_gold.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_gold.alpha, lf_shellac.alpha));
     vec3 root = lf_amount(lf_shellac_rest, crossing.s) * lf_amount(lf_shellac_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_gold.alpha);
     vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_gold.alpha) * lobes) + rest);

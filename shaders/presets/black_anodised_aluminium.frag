@@ -92,21 +92,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.10512832, 0.10233162, 0.09692574),        // c0: coefficients of the powers of the curves' argument
-    vec3(0.0039771777, 0.003968766, 0.003958812),    // c1: 
-    vec3(0.0035903342, 0.0035373643, 0.0034351535),  // c2: 
-    vec3(0.015053809, 0.014642611, 0.013852969),     // c3: 
-    vec3(-0.01022438, -0.009831168, -0.0090812),     // c4: 
-    vec3(-0.018423304, -0.017812952, -0.01664579)    // c5: 
+    vec3(0.10512833, 0.102331646, 0.09692576),       // c0: coefficients of the powers of the curves' argument
+    vec3(0.003977116, 0.0039687995, 0.0039588287),   // c1: 
+    vec3(0.0035902672, 0.0035372786, 0.0034351125),  // c2: 
+    vec3(0.015053958, 0.0146424025, 0.0138528645),   // c3: 
+    vec3(-0.010224339, -0.009831082, -0.00908117),   // c4: 
+    vec3(-0.018423453, -0.017812908, -0.01664573)    // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.24074851, 0.2390249, 0.23320916),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.004229646, -0.0042495914, -0.0042068027),  // c1: 
-    vec3(0.0035168603, 0.0036135986, 0.0037836134),    // c2: 
-    vec3(0.023410171, 0.02358684, 0.02374041),         // c3: 
-    vec3(-0.0261148, -0.025942713, -0.025363743),      // c4: 
-    vec3(-0.036583632, -0.036527455, -0.036093146)     // c5: 
+    vec3(0.24074851, 0.23902489, 0.23320913),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0042296313, -0.0042495616, -0.0042067617),  // c1: 
+    vec3(0.0035168156, 0.0036136955, 0.0037836507),     // c2: 
+    vec3(0.023409992, 0.02358669, 0.02374056),          // c3: 
+    vec3(-0.026114777, -0.025942788, -0.025363736),     // c4: 
+    vec3(-0.036583483, -0.036527395, -0.036093324)      // c5: 
 );
 
 const Interface lf_oxide_across = Interface(
@@ -289,18 +289,33 @@ vec3 lf_amount(Curve curve, float s) {
     return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
 }
 
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+vec2 lf_blurred2(vec2 width, vec2 spread) {
+    vec2 shared_ = width * spread / max(width + spread, 1e-14);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, vec2 alpha) {
     vec2 base = alpha * M;
-    vec2 t = i.a + o.a;
-    vec2 shared_ = base * t / max(base + t, 1e-14);
-    vec2 width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    vec2 width2 = lf_blurred2(base, i.a + o.a);
     float size = sqrt(width2.x * width2.y);
-    t = base * base + 0.8294 * (i.a * i.a + o.a * o.a);
+    vec2 t = base * base + 0.8294 * (i.a * i.a + o.a * o.a);
     float x = 0.3431 * (size / sqrt(t.x * t.y) - 1.0);
     t = i.w.xy + o.w.xy;
     float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
     return 1.0 / (3.1415927 * size * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
+}
+
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+vec2 lf_blurred22(vec2 width, vec2 spread) {
+    vec2 shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+vec2 lf_wider(vec2 alpha, vec2 coat_alpha) {
+    return sqrt(lf_blurred22(sqrt(lf_blurred22(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -352,11 +367,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     float even = sqrt(0.5 * (lf_oxide.alpha_x * lf_oxide.alpha_x + lf_oxide.alpha_y * lf_oxide.alpha_y));
     float rise = 1.0 + 0.3861 * there * even * even * share;
     vec3 again = F2 * (lf_amount(lf_oxide_again, crossing.s) * lf_amount(lf_oxide_again, crossing2.s));
-    vec2 shared_ = own * own / (own + own);
-    vec2 t = sqrt(own * own + own * own + 3.173 * (shared_ * shared_));
-    vec2 t2 = 0.4 * top;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, lf_wider(own, top));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, sqrt(0.5 * (lf_aluminium.alpha_x * lf_aluminium.alpha_x + lf_aluminium.alpha_y * lf_aluminium.alpha_y)));
     vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);

@@ -88,21 +88,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.051936053, 0.18103972, 0.4765097),        // c0: coefficients of the powers of the curves' argument
-    vec3(0.0041462593, 0.003268186, -0.029494748),   // c1: 
-    vec3(0.001373183, 0.0042243227, 0.0075719357),   // c2: 
-    vec3(0.0046937466, 0.02330254, 0.06963694),      // c3: 
-    vec3(-0.0020683147, -0.018003523, -0.0653778),   // c4: 
-    vec3(-0.0049091056, -0.030430853, -0.09896803)   // c5: 
+    vec3(0.05193605, 0.18103969, 0.4765097),         // c0: coefficients of the powers of the curves' argument
+    vec3(0.0041462835, 0.0032682605, -0.029494904),  // c1: 
+    vec3(0.0013731569, 0.00422436, 0.0075720996),    // c2: 
+    vec3(0.0046937168, 0.023302153, 0.069637),       // c3: 
+    vec3(-0.002068285, -0.018003546, -0.065377936),  // c4: 
+    vec3(-0.0049090683, -0.030430585, -0.09896827)   // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
     vec3(0.1602691, 0.33893105, 0.6975374),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0019091778, -0.005599469, -0.030133143),  // c1: 
-    vec3(0.009908993, 0.008327544, 0.0119867325),     // c2: 
-    vec3(0.02214238, 0.02277264, 0.039175093),        // c3: 
-    vec3(-0.021037683, -0.03679523, -0.072719574),    // c4: 
-    vec3(-0.029286176, -0.04327625, -0.08268911)      // c5: 
+    vec3(-0.0019091107, -0.005599536, -0.030132905),  // c1: 
+    vec3(0.009909015, 0.008327365, 0.011986971),      // c2: 
+    vec3(0.022142053, 0.022772968, 0.03917396),       // c3: 
+    vec3(-0.02103775, -0.036795035, -0.07271984),     // c4: 
+    vec3(-0.029285893, -0.043276757, -0.08268827)     // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -244,16 +244,25 @@ vec3 lf_amount(Curve curve, float s) {
     return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
 }
 
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+float lf_blurred2(float width, float spread) {
+    float shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float t = i.a + o.a;
-    float shared_ = base * t / (base + t);
-    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float width2 = lf_blurred2(base, i.a + o.a);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t2 = i.w.xyz + o.w.xyz;
-    float v = dot(t2, t2) / width2;
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+float lf_wider(float alpha, float coat_alpha) {
+    return sqrt(lf_blurred2(sqrt(lf_blurred2(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -299,11 +308,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float rise = 1.0 + 0.3861 * there * lf_oxide.alpha * lf_oxide.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_oxide_again, crossing.s) * lf_amount(lf_oxide_again, crossing2.s));
-    float shared_ = lf_aluminium.alpha * lf_aluminium.alpha / (lf_aluminium.alpha + lf_aluminium.alpha);
-    float t = sqrt(lf_aluminium.alpha * lf_aluminium.alpha + lf_aluminium.alpha * lf_aluminium.alpha + 3.173 * (shared_ * shared_));
-    float t2 = 0.4 * lf_oxide.alpha;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_oxide.alpha));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_aluminium.alpha);
     vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);

@@ -88,21 +88,21 @@ const Conductor lf_silver = Conductor(
 );
 
 const Curve lf_glass_again = Curve(
-    vec3(0.061484847, 0.11408435, 0.31908724),         // c0: coefficients of the powers of the curves' argument
-    vec3(0.0004953947, -0.00017339364, -0.005574994),  // c1: 
-    vec3(0.0049784184, 0.010460276, 0.032363757),      // c2: 
-    vec3(0.010293983, 0.023225099, 0.07975131),        // c3: 
-    vec3(-0.003522206, -0.010932565, -0.04926701),     // c4: 
-    vec3(-0.008758314, -0.022821188, -0.09099513)      // c5: 
+    vec3(0.06148487, 0.11408439, 0.3190873),           // c0: coefficients of the powers of the curves' argument
+    vec3(0.0004953407, -0.0001735352, -0.0055752993),  // c1: 
+    vec3(0.0049783587, 0.010460231, 0.032363802),      // c2: 
+    vec3(0.010294132, 0.023225427, 0.07975209),        // c3: 
+    vec3(-0.0035221688, -0.01093258, -0.049267203),    // c4: 
+    vec3(-0.008758374, -0.022821337, -0.09099543)      // c5: 
 );
 
 const Curve lf_glass_rest = Curve(
-    vec3(0.22621357, 0.3342644, 0.74630064),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.011936996, -0.015942246, -0.03353043),  // c1: 
-    vec3(0.008632608, 0.009264424, 0.02077511),     // c2: 
-    vec3(0.041101664, 0.0451276, 0.07673299),       // c3: 
-    vec3(-0.02266945, -0.0317944, -0.086229295),    // c4: 
-    vec3(-0.043732792, -0.05408135, -0.12162906)    // c5: 
+    vec3(0.22621362, 0.3342644, 0.7463007),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.01193722, -0.015942544, -0.033530414),   // c1: 
+    vec3(0.008632913, 0.009264737, 0.020775527),     // c2: 
+    vec3(0.041102767, 0.04512903, 0.07673347),       // c3: 
+    vec3(-0.022669911, -0.03179492, -0.08622983),    // c4: 
+    vec3(-0.043733776, -0.054082513, -0.121629596)   // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -244,16 +244,31 @@ vec3 lf_amount(Curve curve, float s) {
     return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
 }
 
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+float lf_blurred2(float width, float spread) {
+    float shared_ = width * spread / max(width + spread, 1e-14);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float t = i.a + o.a;
-    float shared_ = base * t / max(base + t, 1e-14);
-    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float width2 = lf_blurred2(base, i.a + o.a);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t2 = i.w.xyz + o.w.xyz;
-    float v = dot(t2, t2) / width2;
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
+}
+
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+float lf_blurred22(float width, float spread) {
+    float shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+float lf_wider(float alpha, float coat_alpha) {
+    return sqrt(lf_blurred22(sqrt(lf_blurred22(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -299,11 +314,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_silver.eta, lf_silver.k);
     float rise = 1.0 + 0.3861 * there * lf_glass.alpha * lf_glass.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_glass_again, crossing.s) * lf_amount(lf_glass_again, crossing2.s));
-    float shared_ = lf_silver.alpha * lf_silver.alpha / (lf_silver.alpha + lf_silver.alpha);
-    float t = sqrt(lf_silver.alpha * lf_silver.alpha + lf_silver.alpha * lf_silver.alpha + 3.173 * (shared_ * shared_));
-    float t2 = 0.4 * lf_glass.alpha;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_silver.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_silver.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_silver.alpha, lf_glass.alpha));
     vec3 root = lf_amount(lf_glass_rest, crossing.s) * lf_amount(lf_glass_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_silver.alpha);
     vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_silver.alpha) * lobes) + rest);

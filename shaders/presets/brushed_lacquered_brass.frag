@@ -90,21 +90,21 @@ const Conductor lf_brass = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.42249942, 0.41596287, 0.40688264),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.014193058, -0.013624363, -0.014244258),  // c1: 
-    vec3(0.002750054, 0.001818344, -0.00038404018),  // c2: 
-    vec3(-0.013451546, -0.01593107, -0.022102058),   // c3: 
-    vec3(-0.07764311, -0.07594581, -0.07448354),     // c4: 
-    vec3(-0.057833552, -0.054947227, -0.0510875)     // c5: 
+    vec3(0.4224995, 0.41596287, 0.40688267),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.014192969, -0.013624363, -0.0142442435),  // c1: 
+    vec3(0.002750069, 0.0018184334, -0.0003843084),   // c2: 
+    vec3(-0.013451844, -0.015931338, -0.022102088),   // c3: 
+    vec3(-0.07764311, -0.07594602, -0.074483275),     // c4: 
+    vec3(-0.057833314, -0.0549469, -0.051087588)      // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.83247924, 0.71440005, 0.44934726),      // c0: coefficients of the powers of the curves' argument
-    vec3(-0.042790055, -0.0364106, -0.025350176),  // c1: 
-    vec3(0.025563061, 0.020827696, 0.011006594),   // c2: 
-    vec3(0.015206516, 0.0070174336, -0.0050053),   // c3: 
-    vec3(-0.1322161, -0.11567828, -0.07749823),    // c4: 
-    vec3(-0.12762225, -0.107916296, -0.06761423)   // c5: 
+    vec3(0.83247924, 0.71440005, 0.44934726),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.042790025, -0.03641066, -0.025350176),   // c1: 
+    vec3(0.025562882, 0.020827666, 0.0110064745),    // c2: 
+    vec3(0.015206635, 0.0070174932, -0.0050050914),  // c3: 
+    vec3(-0.13221592, -0.11567828, -0.07749814),     // c4: 
+    vec3(-0.12762237, -0.107916296, -0.06761435)     // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -246,18 +246,39 @@ vec3 lf_amount(Curve curve, float s) {
     return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
 }
 
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+vec2 lf_blurred2(vec2 width, float spread) {
+    vec2 shared_ = width * spread / max(width + spread, 1e-14);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, vec2 alpha) {
     vec2 base = alpha * M;
-    float t = i.a + o.a;
-    vec2 shared_ = base * t / max(base + t, 1e-14);
-    vec2 width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    vec2 width2 = lf_blurred2(base, i.a + o.a);
     float size = sqrt(width2.x * width2.y);
-    vec2 t2 = base * base + 0.8294 * (i.a * i.a + o.a * o.a);
-    float x = 0.3431 * (size / sqrt(t2.x * t2.y) - 1.0);
-    t2 = i.w.xy + o.w.xy;
-    float v = t2.x * t2.x / width2.x + t2.y * t2.y / width2.y;
+    vec2 t = base * base + 0.8294 * (i.a * i.a + o.a * o.a);
+    float x = 0.3431 * (size / sqrt(t.x * t.y) - 1.0);
+    t = i.w.xy + o.w.xy;
+    float v = t.x * t.x / width2.x + t.y * t.y / width2.y;
     return 1.0 / (3.1415927 * size * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
+}
+
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+vec2 lf_blurred2(vec2 width, vec2 spread) {
+    vec2 shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+vec2 lf_blurred22(vec2 width, float spread) {
+    vec2 shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+vec2 lf_wider(vec2 alpha, float coat_alpha) {
+    return sqrt(lf_blurred22(sqrt(lf_blurred2(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -312,11 +333,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_brass.eta, lf_brass.k);
     float rise = 1.0 + 0.3861 * there * lf_lacquer.alpha * lf_lacquer.alpha * share;
     vec3 again = F2 * (lf_amount(lf_lacquer_again, crossing.s) * lf_amount(lf_lacquer_again, crossing2.s));
-    vec2 shared_ = own * own / (own + own);
-    vec2 t = sqrt(own * own + own * own + 3.173 * (shared_ * shared_));
-    float t2 = 0.4 * lf_lacquer.alpha;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, lf_wider(own, lf_lacquer.alpha));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, sqrt(0.5 * (lf_brass.alpha_x * lf_brass.alpha_x + lf_brass.alpha_y * lf_brass.alpha_y)));
     vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);

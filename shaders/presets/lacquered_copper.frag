@@ -88,21 +88,21 @@ const Conductor lf_copper = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.4570671, 0.35456714, 0.1823068),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.063961364, -0.039953694, -0.013034489),  // c1: 
-    vec3(0.022261433, 0.015880272, 0.008814409),     // c2: 
-    vec3(0.046931833, 0.0332475, 0.02166535),        // c3: 
-    vec3(-0.121284574, -0.09275403, -0.04560338),    // c4: 
-    vec3(-0.11538395, -0.08750728, -0.046186805)     // c5: 
+    vec3(0.45706707, 0.35456714, 0.18230677),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.06396117, -0.039953552, -0.013034441),  // c1: 
+    vec3(0.02226162, 0.01588045, 0.008814532),      // c2: 
+    vec3(0.04693106, 0.033246875, 0.021665096),     // c3: 
+    vec3(-0.12128475, -0.09275427, -0.0456035),     // c4: 
+    vec3(-0.115383446, -0.08750671, -0.046186537)   // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.7820462, 0.45333117, 0.26108205),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.083143175, -0.04643941, -0.025496434),  // c1: 
-    vec3(0.020463139, 0.014473073, 0.018237077),    // c2: 
-    vec3(0.06437695, 0.038382143, 0.046581924),     // c3: 
-    vec3(-0.14681754, -0.095737025, -0.07114426),   // c4: 
-    vec3(-0.15313566, -0.097661614, -0.083030045)   // c5: 
+    vec3(0.7820461, 0.45333123, 0.26108205),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.08314325, -0.046439372, -0.025496382),  // c1: 
+    vec3(0.020463213, 0.014472969, 0.018237017),    // c2: 
+    vec3(0.06437707, 0.038382053, 0.04658191),      // c3: 
+    vec3(-0.14681765, -0.09573686, -0.07114419),    // c4: 
+    vec3(-0.15313518, -0.097661614, -0.08303)       // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -244,16 +244,25 @@ vec3 lf_amount(Curve curve, float s) {
     return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
 }
 
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+float lf_blurred2(float width, float spread) {
+    float shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float t = i.a + o.a;
-    float shared_ = base * t / (base + t);
-    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float width2 = lf_blurred2(base, i.a + o.a);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t2 = i.w.xyz + o.w.xyz;
-    float v = dot(t2, t2) / width2;
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+float lf_wider(float alpha, float coat_alpha) {
+    return sqrt(lf_blurred2(sqrt(lf_blurred2(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -299,11 +308,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_copper.eta, lf_copper.k);
     float rise = 1.0 + 0.3861 * there * lf_lacquer.alpha * lf_lacquer.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_lacquer_again, crossing.s) * lf_amount(lf_lacquer_again, crossing2.s));
-    float shared_ = lf_copper.alpha * lf_copper.alpha / (lf_copper.alpha + lf_copper.alpha);
-    float t = sqrt(lf_copper.alpha * lf_copper.alpha + lf_copper.alpha * lf_copper.alpha + 3.173 * (shared_ * shared_));
-    float t2 = 0.4 * lf_lacquer.alpha;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_copper.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_copper.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_copper.alpha, lf_lacquer.alpha));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_copper.alpha);
     vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_copper.alpha) * lobes) + rest);

@@ -89,20 +89,20 @@ const Conductor lf_aluminium = Conductor(
 
 const Curve lf_lacquer_again = Curve(
     vec3(0.5982471, 0.5957608, 0.5869738),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.059255935, -0.058735937, -0.054995112),  // c1: 
-    vec3(-0.064245865, -0.06397284, -0.06301296),    // c2: 
-    vec3(-0.030506283, -0.031115592, -0.034228295),  // c3: 
-    vec3(-0.11314517, -0.11236209, -0.11036451),     // c4: 
-    vec3(-0.09669924, -0.095636606, -0.092007935)    // c5: 
+    vec3(-0.059255876, -0.05873581, -0.054995134),   // c1: 
+    vec3(-0.06424618, -0.06397264, -0.063012995),    // c2: 
+    vec3(-0.030506045, -0.031116545, -0.034228176),  // c3: 
+    vec3(-0.113144904, -0.11236225, -0.11036454),    // c4: 
+    vec3(-0.09669936, -0.09563586, -0.092008114)     // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.7571852, 0.7470394, 0.73860687),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.06868847, -0.06793345, -0.06493266),       // c1: 
-    vec3(0.0015773773, 0.00059761107, -0.0011479706),  // c2: 
-    vec3(0.07874924, 0.07603103, 0.06974149),          // c3: 
-    vec3(-0.15356559, -0.15057865, -0.14713502),       // c4: 
-    vec3(-0.1838063, -0.17983323, -0.17371714)         // c5: 
+    vec3(0.7571852, 0.74703944, 0.73860687),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.06868844, -0.067933336, -0.06493274),      // c1: 
+    vec3(0.0015773475, 0.00059743226, -0.0011480153),  // c2: 
+    vec3(0.07874924, 0.07603121, 0.06974131),          // c3: 
+    vec3(-0.15356565, -0.15057847, -0.14713499),       // c4: 
+    vec3(-0.18380642, -0.17983341, -0.17371714)        // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -244,16 +244,25 @@ vec3 lf_amount(Curve curve, float s) {
     return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
 }
 
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+float lf_blurred2(float width, float spread) {
+    float shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float t = i.a + o.a;
-    float shared_ = base * t / (base + t);
-    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float width2 = lf_blurred2(base, i.a + o.a);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t2 = i.w.xyz + o.w.xyz;
-    float v = dot(t2, t2) / width2;
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+float lf_wider(float alpha, float coat_alpha) {
+    return sqrt(lf_blurred2(sqrt(lf_blurred2(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -299,11 +308,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float rise = 1.0 + 0.3861 * there * lf_lacquer.alpha * lf_lacquer.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_lacquer_again, crossing.s) * lf_amount(lf_lacquer_again, crossing2.s));
-    float shared_ = lf_aluminium.alpha * lf_aluminium.alpha / (lf_aluminium.alpha + lf_aluminium.alpha);
-    float t = sqrt(lf_aluminium.alpha * lf_aluminium.alpha + lf_aluminium.alpha * lf_aluminium.alpha + 3.173 * (shared_ * shared_));
-    float t2 = 0.4 * lf_lacquer.alpha;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_lacquer.alpha));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_aluminium.alpha);
     vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);

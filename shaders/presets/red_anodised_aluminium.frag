@@ -88,21 +88,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.50211984, 0.09377763, 0.114810936),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.032300517, 0.0048942417, 0.0048337057),  // c1: 
-    vec3(0.0050753355, 0.0025949702, 0.003090024),   // c2: 
-    vec3(0.068044424, 0.0105571, 0.013551578),       // c3: 
-    vec3(-0.06660494, -0.0066101775, -0.009167798),  // c4: 
-    vec3(-0.09992468, -0.012515008, -0.016608655)    // c5: 
+    vec3(0.50211984, 0.09377763, 0.11481093),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.032300524, 0.004894279, 0.004833743),    // c1: 
+    vec3(0.0050751716, 0.0025949478, 0.0030900314),  // c2: 
+    vec3(0.0680446, 0.010556936, 0.013551533),       // c3: 
+    vec3(-0.06660481, -0.006610181, -0.009167843),   // c4: 
+    vec3(-0.09992492, -0.012514889, -0.01660861)     // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.7191084, 0.22766025, 0.2584757),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.030439869, -0.002839949, -0.003449954),  // c1: 
-    vec3(0.008312851, 0.0099888, 0.00967478),        // c2: 
-    vec3(0.032741964, 0.023315012, 0.023171127),     // c3: 
-    vec3(-0.07025036, -0.02730947, -0.029939532),    // c4: 
-    vec3(-0.07784724, -0.03523791, -0.037403524)     // c5: 
+    vec3(0.7191085, 0.22766027, 0.25847566),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.03043969, -0.0028399155, -0.0034499466),  // c1: 
+    vec3(0.008312583, 0.009988785, 0.009674951),      // c2: 
+    vec3(0.032741487, 0.023314953, 0.023171186),      // c3: 
+    vec3(-0.070250124, -0.027309395, -0.029939637),   // c4: 
+    vec3(-0.07784718, -0.03523788, -0.037403613)      // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -244,16 +244,25 @@ vec3 lf_amount(Curve curve, float s) {
     return curve.c0 + s * (curve.c1 + s * (curve.c2 + s * (curve.c3 + s * (curve.c4 + s * curve.c5))));
 }
 
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+float lf_blurred2(float width, float spread) {
+    float shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float t = i.a + o.a;
-    float shared_ = base * t / (base + t);
-    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float width2 = lf_blurred2(base, i.a + o.a);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t2 = i.w.xyz + o.w.xyz;
-    float v = dot(t2, t2) / width2;
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+float lf_wider(float alpha, float coat_alpha) {
+    return sqrt(lf_blurred2(sqrt(lf_blurred2(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -299,11 +308,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float rise = 1.0 + 0.3861 * there * lf_oxide.alpha * lf_oxide.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_oxide_again, crossing.s) * lf_amount(lf_oxide_again, crossing2.s));
-    float shared_ = lf_aluminium.alpha * lf_aluminium.alpha / (lf_aluminium.alpha + lf_aluminium.alpha);
-    float t = sqrt(lf_aluminium.alpha * lf_aluminium.alpha + lf_aluminium.alpha * lf_aluminium.alpha + 3.173 * (shared_ * shared_));
-    float t2 = 0.4 * lf_oxide.alpha;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_oxide.alpha));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_aluminium.alpha);
     vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);

@@ -112,12 +112,12 @@ const Curve lf_coat_passed = Curve(
 );
 
 const Curve lf_coat_inner_again = Curve(
-    vec3(0.6817516, 0.48762602, 0.24483596),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.17641452, -0.09085984, -0.03295686),    // c1: 
-    vec3(0.008886337, 0.017604865, 0.013391711),    // c2: 
-    vec3(-0.029954016, 0.00023180246, 0.02364315),  // c3: 
-    vec3(-0.10627863, -0.090021774, -0.049215138),  // c4: 
-    vec3(-0.065580994, -0.07798141, -0.05447258)    // c5: 
+    vec3(0.6817515, 0.48762596, 0.24483591),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.17641434, -0.09085984, -0.032956827),    // c1: 
+    vec3(0.008886725, 0.017605133, 0.013391763),     // c2: 
+    vec3(-0.029954284, 0.00023138523, 0.023642972),  // c3: 
+    vec3(-0.10627872, -0.09002198, -0.049215175),    // c4: 
+    vec3(-0.06558031, -0.077980876, -0.054472446)    // c5: 
 );
 
 const Curve lf_coat_inner_rest = Curve(
@@ -136,12 +136,12 @@ const Conductor lf_base = Conductor(
 );
 
 const Curve lf_coat_again = Curve(
-    vec3(0.33393082, 0.43529058, 0.29938802),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.024904504, -0.03508725, -0.03115151),   // c1: 
-    vec3(0.031484477, 0.028582111, 0.016576529),    // c2: 
-    vec3(0.05128336, 0.029459685, 0.015582085),     // c3: 
-    vec3(-0.070911825, -0.07764107, -0.05261804),   // c4: 
-    vec3(-0.07806337, -0.071961105, -0.048757672)   // c5: 
+    vec3(0.33393082, 0.4352906, 0.299388),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.024904296, -0.035086997, -0.031151477),  // c1: 
+    vec3(0.031484544, 0.028582096, 0.016576536),     // c2: 
+    vec3(0.051282704, 0.029458791, 0.015581995),     // c3: 
+    vec3(-0.070911855, -0.07764098, -0.052617982),   // c4: 
+    vec3(-0.07806289, -0.07196063, -0.048757493)     // c5: 
 );
 
 const Curve lf_coat_rest = Curve(
@@ -286,16 +286,25 @@ vec3 lf_spread_root(float theta, vec3 tau) {
     return sqrt(1.0 + 2.0 * theta * tau);
 }
 
+// The squared width of a lobe of this width, seen by way of slopes that spread it.
+float lf_blurred2(float width, float spread) {
+    float shared_ = width * spread / (width + spread);
+    return width * width + spread * spread + 3.173 * (shared_ * shared_);
+}
+
 // Density of a lobe about the refracted directions, of a base of width alpha seen through the interface twice; M is the sum of the cosines.
 float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
-    float t = i.a + o.a;
-    float shared_ = base * t / (base + t);
-    float width2 = base * base + t * t + 3.173 * (shared_ * shared_);
+    float width2 = lf_blurred2(base, i.a + o.a);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t2 = i.w.xyz + o.w.xyz;
-    float v = dot(t2, t2) / width2;
+    vec3 t = i.w.xyz + o.w.xyz;
+    float v = dot(t, t) / width2;
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
+}
+
+// Width of the lobe of light that met a base of width alpha twice, and the coat in between.
+float lf_wider(float alpha, float coat_alpha) {
+    return sqrt(lf_blurred2(sqrt(lf_blurred2(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -370,11 +379,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     float F2 = lf_fresnel_dielectric(min(0.5 * sqrt(h2), 1.0), lf_primer.eta);
     float rise = 1.0 + 0.3861 * there * lf_coat.alpha * lf_coat.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_coat_inner_again, crossing.s) * lf_amount(lf_coat_inner_again, crossing2.s));
-    float shared_ = lf_primer.alpha * lf_primer.alpha / (lf_primer.alpha + lf_primer.alpha);
-    float t = sqrt(lf_primer.alpha * lf_primer.alpha + lf_primer.alpha * lf_primer.alpha + 3.173 * (shared_ * shared_));
-    float t2 = 0.4 * lf_coat.alpha;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_primer.alpha) + again * lf_lobe(crossing, crossing2, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_primer.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_primer.alpha, lf_coat.alpha));
     vec3 root = lf_amount(lf_coat_inner_rest, crossing.s) * lf_amount(lf_coat_inner_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_primer.alpha);
     throughput = crossing3.T * crossing4.T / (eta * eta);
@@ -394,11 +399,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec3 F3 = lf_fresnel_conductor(min(0.5 * sqrt(h22), 1.0), lf_base.eta, lf_base.k);
     rise = 1.0 + 0.3861 * there * alpha * alpha * shares.base;
     again = F3 * (lf_amount(lf_coat_again, crossing3.s) * lf_amount(lf_coat_again, crossing4.s));
-    shared_ = lf_base.alpha * lf_base.alpha / (lf_base.alpha + lf_base.alpha);
-    t = sqrt(lf_base.alpha * lf_base.alpha + lf_base.alpha * lf_base.alpha + 3.173 * (shared_ * shared_));
-    t2 = 0.4 * alpha;
-    shared_ = t * t2 / (t + t2);
-    vec3 lobes2 = rise * lf_lobe(crossing3, crossing4, h.w, lf_base.alpha) + again * lf_lobe(crossing3, crossing4, h.w, sqrt(t * t + t2 * t2 + 3.173 * (shared_ * shared_)));
+    vec3 lobes2 = rise * lf_lobe(crossing3, crossing4, h.w, lf_base.alpha) + again * lf_lobe(crossing3, crossing4, h.w, lf_wider(lf_base.alpha, alpha));
     root = lf_amount(lf_coat_rest, crossing3.s) * lf_amount(lf_coat_rest, crossing4.s);
     vec3 rest2 = root * root * lf_ahead(crossing3, crossing4, lf_base.alpha);
     vec3 value = F * (D * V) + (throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_primer.alpha) * lobes) + rest) + kept * (throughput3 * (F3 * U2 * (lf_seen(yi2, yo2, h22, lf_base.alpha) * lobes2) + rest2)));

@@ -7,14 +7,11 @@ step from the fitted parameters to those that an exact form would have been fitt
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .. import walk
-from .._compiled import Compiled
 from ..capture.load import AnyView
 from ..capture.samples import Samples, View
 from ..render import brdf_values, predict
@@ -127,16 +124,9 @@ def _extent(stack: Stack, view: View, index: np.ndarray) -> np.ndarray:
     return (seen(0.0, 0.0) - np.mean([seen(dx, dy) for dx in places for dy in places], 0))[back]
 
 
-def _lobe(coat: Any, wi: Any, wo: Any) -> Any:
-    return jax.vmap(lambda i, o: jnp.broadcast_to(coat.evaluate(i, o), (3,)))(wi, wo)
-
-
-_compiled_lobe = Compiled(_lobe, optimise=1)
-
-
 def _top(stack: Stack, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    """BRDF of the top interface alone, (n, 3): the same in every form and in the walk."""
+    """BRDF of the top interface alone, (n, 3): the same in every form and in the walk. Always of as many pairs, to be compiled once."""
     size = PAIRS - len(wi)
     wi, wo = (np.pad(w, ((0, size), (0, 0)), "edge") for w in (wi, wo))
     with jax.enable_x64(False):
-        return np.asarray(_compiled_lobe(stack.astype(np.float32).layers[0], wi, wo))[: PAIRS - size]
+        return walk.top_lobe(stack, wi, wo)[: PAIRS - size]

@@ -51,6 +51,7 @@ class Curve:
     c5: Colour = member("")
 
 
+@chunk
 def wider(alpha: Scalar, coat_alpha: Scalar) -> Scalar:
     """Width of the lobe of light that met a base of width alpha twice, and the coat in between."""
     return blurred(blurred(alpha, alpha), AGAIN * coat_alpha)

@@ -104,6 +104,7 @@ def curve(low: Vec4, high: Vec2, s: Scalar) -> Scalar:
     return low[0] + s * (low[1] + s * (low[2] + s * (low[3] + s * (high[0] + s * high[1]))))
 
 
+@chunk
 def blurred2(width: Any, spread: Any) -> Any:
     """The squared width of a lobe of this width, seen by way of slopes that spread it."""
     shared = safe_divide(width * spread, width + spread)
