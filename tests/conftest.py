@@ -61,9 +61,10 @@ MOST_MEMORY = min(6.0e9, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> None:
-    """What computes much, as some fits and the walk do, is compiled as its users have it, for the fixtures too. So is all that runs in a
-    program of its own."""
-    OPTIONS[_LEVEL] = _OPTIMISED if item.get_closest_marker("optimised") else 0
+    """What computes much, as some fits and the walk do, is compiled as its users have it or at the level that its mark names, for the
+    fixtures too. All that runs in a program of its own is as its users have it."""
+    mark = item.get_closest_marker("optimised")
+    OPTIONS[_LEVEL] = next(iter(mark.args), _OPTIMISED) if mark else 0
 
 
 @pytest.fixture(autouse=True)

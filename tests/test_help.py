@@ -17,8 +17,6 @@ from measured_files import write_cornell, write_rgl
 from test_cli import COMMANDS
 from test_docs import blocks, commands
 
-pytestmark = pytest.mark.optimised
-
 KNOWN = typer.main.get_command(app).commands  # pyright: ignore
 HELP = [line for name in COMMANDS for line in re.findall(r"^  (layerfit .*)$", KNOWN[name].help, re.MULTILINE)]
 PAGES = [
@@ -38,6 +36,7 @@ LONG = ("stability", "tradeoff")
 EXAMPLES = list({kind(e): e for e in [*PAGES, *HELP] if e in HELP or e.split()[1] not in LONG}.values())
 
 LESS = {
+    "--workers": ["--workers", "2"],
     "fit": ["--starts", "1"],
     "structures": ["--only", "diffuse,metal"],
     "truth": ["--paths", "1000"],
@@ -46,6 +45,8 @@ LESS = {
 }
 """Options that leave an example what it is and take most of its time away."""
 
+OPTIMISED = ("fit", "batch", "demo", "truth", "render", "eval", "study")
+"""What computes more than it compiles, or is compiled by other tests and programs too."""
 
 SLOW = ("fit", "structures", "batch", "advise", "truth", "tradeoff", "specialise", "demo")
 
@@ -85,7 +86,12 @@ def workplace(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("example", [pytest.param(e, marks=pytest.mark.slow if e.split()[1] in SLOW else ()) for e in EXAMPLES])
+def marks(example: str) -> list[pytest.MarkDecorator]:
+    command = example.split()[1]
+    return [mark for mark, of in ((pytest.mark.slow, SLOW), (pytest.mark.optimised, OPTIMISED)) if command in of]
+
+
+@pytest.mark.parametrize("example", [pytest.param(e, marks=marks(e)) for e in EXAMPLES])
 def test_an_example_runs(example, workplace, gl, tmp_path, monkeypatch):
     folder = shutil.copytree(workplace, tmp_path / "here")
     monkeypatch.chdir(folder)
@@ -94,7 +100,7 @@ def test_an_example_runs(example, workplace, gl, tmp_path, monkeypatch):
     monkeypatch.setattr("layerfit.shader.cost.SIDE", 64)
     monkeypatch.setattr("layerfit.view.serve", lambda text, ready, open_browser: ready("http://127.0.0.1/"))
     words = shlex.split(example)[1:]
-    ran = layerfit(*words, *LESS.get(words[0], ()))
+    ran = layerfit(*words, *(less for word in words for less in LESS.get(word, ())))
     assert ran.code in (0, 1), ran.err  # 1: with findings, as one may have of a small reference
     if "-o" in words:
         assert (folder / words[words.index("-o") + 1]).exists()
