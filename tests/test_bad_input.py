@@ -257,13 +257,14 @@ def outputs(folder):
     (folder / "d.csv").write_text("wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n0,0,1,0,0,1\n")
     (folder / "plan.toml").write_text(PLAN)
     write_panel(folder, side=8)
-    scene, preset = folder / "scene.toml", folder / "truth.json"
+    scene, preset, bare = folder / "scene.toml", folder / "truth.json", folder / "bare.json"
+    bare.write_text(json.dumps(TRUTH | {"layers": []}))
     return {
         "map": ["map", folder / "panel.toml", "-o"],
         "study": ["study", folder / "plan.toml", "-o"],
         "batch": ["batch", scene, "--quick", "-o"],
         "stability": ["stability", "lambert", "--digits", "0", "-o"],
-        "tradeoff": ["tradeoff", preset, "-o"],
+        "tradeoff": ["tradeoff", bare, "-o"],
         "specialise": ["specialise", preset, scene, "-o"],
         "truth": ["truth", preset, "-o"],
         "structures": ["structures", scene, "-o"],

@@ -110,8 +110,11 @@ def test_three_coats_over_any_base(name):
     assert np.all(there > 0.0)
     lacquer, binder, _ = COATS
     two = below(base, lacquer, binder)
-    np.testing.assert_allclose(below(base, lacquer, binder, Coat(name="none", alpha=0.4, eta=1.6)), two, rtol=1e-11)
-    np.testing.assert_allclose(below(base, lacquer, Coat(name="none", alpha=0.4, eta=1.5), binder), two, rtol=1e-11)
+    # Named by its place, and with depths of nothing: of one structure, which is compiled once.
+    none = dataclasses.replace(binder, name="primer", alpha=0.4, eta=1.6, tau=[0.0, 0.0, 0.0])
+    np.testing.assert_allclose(below(base, lacquer, binder, none), two, rtol=1e-11)
+    none, primer = dataclasses.replace(none, name="binder", eta=1.5), dataclasses.replace(binder, name="primer")
+    np.testing.assert_allclose(below(base, lacquer, none, primer), two, rtol=1e-11)
     np.testing.assert_allclose(below(base, Coat(name="none", eta=1.0), lacquer, binder), two, rtol=1e-11)
-    black = dataclasses.replace(binder, tau=60.0)
+    black = dataclasses.replace(binder, tau=[60.0, 60.0, 60.0])
     np.testing.assert_allclose(below(base, lacquer, black), below(Lambert(albedo=0.0), lacquer, black), rtol=1e-12)

@@ -106,6 +106,7 @@ def test_scattering_hides_what_is_below():
 NEAR = {"lambert": 0.03, "conductor": 0.08}
 
 
+@pytest.mark.optimised(1)
 @pytest.mark.parametrize("kind", NEAR)
 def test_it_is_near_to_the_walk(kind):
     """Where each of the parts counts: `tools/measure_haze.py` measures it over random materials."""

@@ -194,6 +194,7 @@ def distance(form, options):
     return np.sum(np.abs(found - f) * mu, 1) / np.sum(f * mu, 1)
 
 
+@pytest.mark.optimised(1)
 def test_axes_are_near_to_the_walk():
     error, plain = distance(precise, Precise()), distance(corrected, corrected.Corrected())
     assert np.median(error) <= 0.06
@@ -302,6 +303,7 @@ def walked_near_one(interface, eta):
     return coat, base, wi, wo, f.reshape(count, views)
 
 
+@pytest.mark.optimised(1)
 @pytest.mark.parametrize("interface", ["single", "multi"])
 @pytest.mark.parametrize("eta", [1.005, 1.02, 1.1])
 def test_near_index_1_it_is_near_to_the_walk(interface, eta):
@@ -347,6 +349,7 @@ def walked_two():
     return coats, base, wi, wo, f.reshape(count, views)
 
 
+@pytest.mark.optimised(1)
 def test_two_coats_are_near_to_the_walk():
     coats, base, wi, wo, f = walked_two()
     mu = wo[:, 2].reshape(f.shape)

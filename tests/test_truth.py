@@ -21,6 +21,8 @@ from layerfit.surfaces import Lambert
 from layerfit.truth import NOISE, below, compare, forms_of, hemisphere, noise, relative_error
 from layerfit.walk import Estimate
 
+pytestmark = pytest.mark.optimised(1)
+
 EXACT = 0.02
 """A smooth coat over a Lambert surface has a closed form: what is left is the coat's width and the walk's noise."""
 

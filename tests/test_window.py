@@ -54,8 +54,14 @@ def ctx(gl, monkeypatch) -> Iterator[Any]:
         target.use()
 
 
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as one:
+        yield one
+
+
 @pytest.mark.parametrize("shape", SHAPES)
-def test_the_picture_is_that_of_the_page(ctx, stack, tmp_path, shape):
+def test_the_picture_is_that_of_the_page(ctx, browser, stack, tmp_path, shape):
     """The first pass, turned: same mesh, camera, lights and shader."""
     path = tmp_path / "view.html"
     path.write_text(view.page(stack, NAME))
@@ -63,7 +69,7 @@ def test_the_picture_is_that_of_the_page(ctx, stack, tmp_path, shape):
         const view = Object.assign(layerfit.views[0], {{ orbit: {json.dumps(TURNED)}, limit: 0, shape: "{shape}" }});
         return Array.from(view.snapshot({SIDE}, {SIDE}, view.lights(0)).pixels);
     }}"""
-    with chromium() as browser, opened(browser, path.as_uri()) as page:
+    with opened(browser, path.as_uri()) as page:
         wanted = np.reshape(evaluated(page, snapshot), (SIDE, SIDE, 4))
     made = Picture(ctx, print_material(stack, NAME, "prepared"))
     made.change(**TURNED, shape=shape)
@@ -78,13 +84,13 @@ def test_the_picture_is_that_of_the_page(ctx, stack, tmp_path, shape):
     assert np.all((np.abs(drawn - wanted).max(-1) <= SAME * wanted[..., :3].max() + MOVED * step)[both])
 
 
-def test_shapes_are_those_of_the_page(tmp_path):
+def test_shapes_are_those_of_the_page(browser, tmp_path):
     path = tmp_path / "view.html"
     path.write_text(view.page(read_preset("bare_concrete"), "bare_concrete"))
     told = (
         "() => Object.entries(SHAPES).map(([name, s]) => [name, Array.from(mesh(s).vertices), Array.from(mesh(s).triangles)])"
     )
-    with chromium() as browser, opened(browser, path.as_uri()) as page:
+    with opened(browser, path.as_uri()) as page:
         wanted = {name: (np.reshape(vertices, (-1, 11)), corners) for name, vertices, corners in evaluated(page, told)}
     assert list(wanted) == list(SHAPES)
     for name, (vertices, corners) in wanted.items():
@@ -96,10 +102,10 @@ def test_shapes_are_those_of_the_page(tmp_path):
 
 
 @pytest.mark.parametrize("k", [0, 1, 700])
-def test_passes_have_the_lights_of_the_page(k, tmp_path):
+def test_passes_have_the_lights_of_the_page(browser, k, tmp_path):
     path = tmp_path / "view.html"
     path.write_text(view.page(read_preset("bare_concrete"), "bare_concrete"))
-    with chromium() as browser, opened(browser, path.as_uri()) as page:
+    with opened(browser, path.as_uri()) as page:
         wanted = evaluated(page, f"() => Object.assign(layerfit.views[0], {{ limit: 0 }}).lights({k})")
     places, colours = lights(k, -0.65, 0.6)
     np.testing.assert_allclose(places, [place for place, _ in wanted], atol=1e-12)
