@@ -30,7 +30,7 @@ from layerfit.forms.faithful import Faithful
 from layerfit.forms.precise import Precise
 from layerfit.layers import Coat
 from layerfit.render import predict
-from layerfit.shader.export import HEADERS, print_material
+from layerfit.shader.export import HEADERS, Shader, print_material
 from layerfit.stack import Stack, evaluate
 from layerfit.surfaces import (
     Blinn,
@@ -257,10 +257,17 @@ APPROXIMATE: dict[str, Stack] = {
 """Fresnel reflectances that are not exact."""
 
 
+@functools.cache
+def printed(stack: Stack, uniforms: bool = False) -> Shader:
+    """The shader of a material of a list, printed once for all tests of it."""
+    return print_material(stack, "test", uniforms)
+
+
 def every_text(stack: Stack) -> dict[str, str]:
     """The shader of a material as files: its numbers as constants and as uniforms, in every language."""
-    printed = {uniforms: print_material(stack, "test", uniforms) for uniforms in (False, True)}
-    return {f"{target}_{uniforms}.frag": shader.text(target) for uniforms, shader in printed.items() for target in HEADERS}
+    return {
+        f"{target}_{uniforms}.frag": printed(stack, uniforms).text(target) for uniforms in (False, True) for target in HEADERS
+    }
 
 
 def compiles(folder: Path, files: Mapping[str, str], *options: str) -> None:

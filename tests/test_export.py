@@ -8,7 +8,7 @@ import jax
 import numpy as np
 import pytest
 
-from helpers import COPPER, STACKS, compiles, varnish
+from helpers import COPPER, STACKS, compiles, printed, varnish
 from layerfit.errors import MachineError
 from layerfit.layers import Coat
 from layerfit.render import radiance
@@ -191,7 +191,7 @@ def test_srgb_on_request(gl):
 @pytest.mark.parametrize("target", HEADERS)
 @pytest.mark.parametrize("name", STACKS)
 def test_the_text_stands_alone(name, target):
-    text = print_material(STACKS[name], name).text(target)
+    text = printed(STACKS[name]).text(target)
     assert text.startswith("#version ")
     assert "#include" not in text
     assert not re.search(r"^//@|@[A-Z]+@", text, re.MULTILINE), "a slot was left open"

@@ -18,6 +18,7 @@ from helpers import (
     compiles,
     every_text,
     hemisphere,
+    printed,
     sphere_view,
     surface_of,
 )
@@ -179,7 +180,7 @@ def _at_spot(stack, covered, wi, wo, dtype):
 
 @pytest.mark.parametrize("name", PATINAS)
 def test_parity_of_a_patina(gl, name):
-    parity = check_pairs(print_material(PATINAS[name], "test"), 16384)
+    parity = check_pairs(printed(PATINAS[name]), 16384)
     assert parity.passed, parity
 
 

@@ -10,7 +10,7 @@ import manual
 import numpy as np
 import pytest
 
-from helpers import STACKS, compiles, every_text
+from helpers import STACKS, compiles, every_text, printed
 from layerfit._chunk import CHUNKS, chunk, dot, member, safe_divide, safe_power, safe_sqrt, struct, vec2, vec3, vec4
 from layerfit._types import Scalar, Vec3
 from layerfit.layers import LAYERS
@@ -215,7 +215,7 @@ def test_every_primitive_is_tried():
 def test_parity_on_random_and_extreme_pairs(gl, name):
     from layerfit.shader.verify import check_pairs
 
-    parity = check_pairs(print_material(STACKS[name], "test"))
+    parity = check_pairs(printed(STACKS[name]))
     assert parity.count == 3 * 65536
     assert parity.p999_rel <= 1e-5, parity
     assert parity.max_rel <= 5e-5, parity
@@ -252,7 +252,7 @@ def test_uniforms_and_constants_draw_the_same(gl, name):
 
     wi, wo = random_pairs(4096, 2)
     one = np.ones((len(wi), 1, 3), np.float32)
-    constants, uniforms = (shade_samples(print_material(STACKS[name], "test", u), wi[:, None], wo, one) for u in (False, True))
+    constants, uniforms = (shade_samples(printed(STACKS[name], u), wi[:, None], wo, one) for u in (False, True))
     np.testing.assert_allclose(uniforms, constants, rtol=2e-5, atol=1e-6)
 
 
