@@ -55,8 +55,9 @@ if importlib.util.find_spec("beartype"):
 gc.set_threshold(50_000, 20, 20)
 
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
-MOST_MEMORY = min(7.5e9, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / (WORKERS + 1))
-"""Bytes in memory above which what JAX keeps compiled is thrown away, which takes seconds, and to make it again some more."""
+MOST_MEMORY = min(6.5e9, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / (WORKERS + 1))
+"""Bytes in memory above which what JAX keeps compiled is thrown away, which takes seconds, and to make it again some more. At 6.3e9 a process
+has 50,000 of the 65,530 mappings that Linux gives it by default."""
 
 
 @pytest.hookimpl(tryfirst=True)
