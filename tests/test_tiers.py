@@ -167,7 +167,7 @@ def test_degrees_are_as_low_as_the_error_allows():
     curves = lambda tier: jax.tree.leaves(tier.stack.base, is_leaf=lambda x: isinstance(x, Polynomial))  # noqa: E731
     degrees = lambda tier: [curve.degree for curve in curves(tier) if isinstance(curve, Polynomial)]  # noqa: E731
     fine, rough = degrees(made("corrected, metal")), degrees(coarse)
-    assert len(rough) == len(fine) == 5
+    assert len(rough) == len(fine) == 6
     assert sum(rough) < sum(fine) - 3
     assert made("corrected, metal").error < coarse.error <= 30.0 * asked
 

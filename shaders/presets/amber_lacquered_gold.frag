@@ -88,21 +88,21 @@ const Conductor lf_gold = Conductor(
 );
 
 const Curve lf_shellac_again = Curve(
-    vec3(0.41007018, 0.36309212, 0.25376877),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.01659526, -0.014081068, -0.008570328),  // c1: 
-    vec3(0.05046647, 0.045692608, 0.030768126),     // c2: 
-    vec3(0.0075036287, 0.005961776, 0.0017192066),  // c3: 
-    vec3(-0.12749568, -0.11129018, -0.07341421),    // c4: 
-    vec3(-0.10804671, -0.093538105, -0.05992514)    // c5: 
+    vec3(0.41007027, 0.3630921, 0.25376874),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.016595133, -0.014081068, -0.008570284),  // c1: 
+    vec3(0.050466113, 0.045692757, 0.030768305),     // c2: 
+    vec3(0.0075033605, 0.0059618056, 0.0017190129),  // c3: 
+    vec3(-0.12749536, -0.1112903, -0.073414356),     // c4: 
+    vec3(-0.10804671, -0.093538135, -0.059925035)    // c5: 
 );
 
 const Curve lf_shellac_rest = Curve(
-    vec3(0.93964374, 0.62593496, 0.29271707),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.07062812, -0.047083035, -0.022610817),  // c1: 
-    vec3(0.025602818, 0.014387742, 0.0050962716),   // c2: 
-    vec3(0.027395368, 0.017853737, 0.011185497),    // c3: 
-    vec3(-0.18329307, -0.12210287, -0.060942978),   // c4: 
-    vec3(-0.19600582, -0.13269192, -0.06896025)     // c5: 
+    vec3(0.93964374, 0.62593484, 0.29271704),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.07062821, -0.047083087, -0.022610862),  // c1: 
+    vec3(0.025602773, 0.014387831, 0.0050962195),   // c2: 
+    vec3(0.027395368, 0.017853916, 0.011185676),    // c3: 
+    vec3(-0.1832931, -0.1221029, -0.060942918),     // c4: 
+    vec3(-0.1960063, -0.13269207, -0.06896047)      // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -152,8 +152,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -173,7 +172,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -190,7 +189,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -232,11 +231,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -246,7 +245,7 @@ vec3 lf_amount(Curve curve, float s) {
 
 // The squared width of a lobe of this width, seen by way of slopes that spread it.
 float lf_blurred2(float width, float spread) {
-    float shared_ = width * spread / max(width + spread, 1e-14);
+    float shared_ = width * spread / (width + spread);
     return width * width + spread * spread + 3.173 * (shared_ * shared_);
 }
 
@@ -260,15 +259,9 @@ float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
 
-// The squared width of a lobe of this width, seen by way of slopes that spread it.
-float lf_blurred22(float width, float spread) {
-    float shared_ = width * spread / (width + spread);
-    return width * width + spread * spread + 3.173 * (shared_ * shared_);
-}
-
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 float lf_wider(float alpha, float coat_alpha) {
-    return sqrt(lf_blurred22(sqrt(lf_blurred22(alpha, alpha)), 0.4 * coat_alpha));
+    return sqrt(lf_blurred2(sqrt(lf_blurred2(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -289,7 +282,7 @@ float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     Crossing crossing = lf_pass_interface(lf_shellac_interface, lf_shellac.eta, lf_shellac.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_shellac_interface, lf_shellac.eta, lf_shellac.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_shellac.eta);

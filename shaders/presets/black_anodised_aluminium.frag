@@ -93,20 +93,20 @@ const Conductor lf_aluminium = Conductor(
 
 const Curve lf_oxide_again = Curve(
     vec3(0.10512833, 0.102331646, 0.09692576),       // c0: coefficients of the powers of the curves' argument
-    vec3(0.003977116, 0.0039687995, 0.0039588287),   // c1: 
-    vec3(0.0035902672, 0.0035372786, 0.0034351125),  // c2: 
-    vec3(0.015053958, 0.0146424025, 0.0138528645),   // c3: 
-    vec3(-0.010224339, -0.009831082, -0.00908117),   // c4: 
-    vec3(-0.018423453, -0.017812908, -0.01664573)    // c5: 
+    vec3(0.0039771255, 0.0039688554, 0.0039587766),  // c1: 
+    vec3(0.0035902523, 0.0035372674, 0.003435079),   // c2: 
+    vec3(0.015053898, 0.014642313, 0.013853088),     // c3: 
+    vec3(-0.01022432, -0.009831063, -0.009081136),   // c4: 
+    vec3(-0.018423408, -0.017812818, -0.016645864)   // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.24074851, 0.23902489, 0.23320913),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0042296313, -0.0042495616, -0.0042067617),  // c1: 
-    vec3(0.0035168156, 0.0036136955, 0.0037836507),     // c2: 
-    vec3(0.023409992, 0.02358669, 0.02374056),          // c3: 
-    vec3(-0.026114777, -0.025942788, -0.025363736),     // c4: 
-    vec3(-0.036583483, -0.036527395, -0.036093324)      // c5: 
+    vec3(0.24074851, 0.23902489, 0.23320916),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0042296275, -0.0042496063, -0.004206687),  // c1: 
+    vec3(0.0035167485, 0.003613688, 0.0037837103),     // c2: 
+    vec3(0.023409933, 0.02358675, 0.023740083),        // c3: 
+    vec3(-0.026114777, -0.025942773, -0.025363848),    // c4: 
+    vec3(-0.036583543, -0.036527514, -0.036092997)     // c5: 
 );
 
 const Interface lf_oxide_across = Interface(
@@ -194,8 +194,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, vec2 alpha, vec3 w) 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -215,7 +214,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // Anisotropic GGX density of facet normals (Burley 2012, eq. 13).
@@ -235,7 +234,7 @@ float lf_ggx_projection_anisotropic(vec3 w, float alpha_x, float alpha_y) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -277,11 +276,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -325,18 +324,23 @@ float lf_ahead(Crossing i, Crossing o, float alpha) {
     return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
 float lf_seen(vec3 yi, vec3 yo, float h2, vec2 width) {
     float M = yi.z + yo.z;
     float slope = h2 / M;
     float projection_i = lf_ggx_projection_anisotropic(yi, width.x, width.y);
     float projection_o = lf_ggx_projection_anisotropic(yo, width.x, width.y);
-    return slope * slope * (yi.z * yo.z) * lf_v_smith(yi.z, yo.z, projection_i, projection_o);
+    return slope * slope * (yi.z * yo.z) * lf_v_smith2(yi.z, yo.z, projection_i, projection_o);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
 vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = min(wi.z, wo.z) > 0.0;
+    bool lit = min(wi.z, wo.z) > 1e-07;
     Interface interface_ = lf_mixed(lf_oxide_interface, lf_oxide_across, lf_share_along(wi));
     Crossing crossing = lf_pass_interface(interface_, lf_oxide.eta, vec2(lf_oxide.alpha_x, lf_oxide.alpha_y), wi);
     interface_ = lf_mixed(lf_oxide_interface, lf_oxide_across, lf_share_along(wo));

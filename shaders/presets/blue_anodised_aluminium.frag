@@ -88,21 +88,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.05193605, 0.18103969, 0.4765097),         // c0: coefficients of the powers of the curves' argument
-    vec3(0.0041462835, 0.0032682605, -0.029494904),  // c1: 
-    vec3(0.0013731569, 0.00422436, 0.0075720996),    // c2: 
-    vec3(0.0046937168, 0.023302153, 0.069637),       // c3: 
-    vec3(-0.002068285, -0.018003546, -0.065377936),  // c4: 
-    vec3(-0.0049090683, -0.030430585, -0.09896827)   // c5: 
+    vec3(0.051936053, 0.18103969, 0.47650972),        // c0: coefficients of the powers of the curves' argument
+    vec3(0.004146279, 0.0032683462, -0.029494986),    // c1: 
+    vec3(0.0013731662, 0.004224308, 0.007571906),     // c2: 
+    vec3(0.0046937168, 0.023301825, 0.069637775),     // c3: 
+    vec3(-0.002068311, -0.018003501, -0.06537786),    // c4: 
+    vec3(-0.0049090683, -0.030430347, -0.098968506)   // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.1602691, 0.33893105, 0.6975374),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0019091107, -0.005599536, -0.030132905),  // c1: 
-    vec3(0.009909015, 0.008327365, 0.011986971),      // c2: 
-    vec3(0.022142053, 0.022772968, 0.03917396),       // c3: 
-    vec3(-0.02103775, -0.036795035, -0.07271984),     // c4: 
-    vec3(-0.029285893, -0.043276757, -0.08268827)     // c5: 
+    vec3(0.16026907, 0.338931, 0.6975374),             // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0019091107, -0.0055994317, -0.030132934),  // c1: 
+    vec3(0.009909097, 0.008327529, 0.0119867325),      // c2: 
+    vec3(0.022142217, 0.02277264, 0.03917432),         // c3: 
+    vec3(-0.021037824, -0.03679514, -0.07271966),      // c4: 
+    vec3(-0.029286027, -0.04327643, -0.08268857)       // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -152,8 +152,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -173,7 +172,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -190,7 +189,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -232,11 +231,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -283,7 +282,7 @@ float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     Crossing crossing = lf_pass_interface(lf_oxide_interface, lf_oxide.eta, lf_oxide.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_oxide_interface, lf_oxide.eta, lf_oxide.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_oxide.eta);

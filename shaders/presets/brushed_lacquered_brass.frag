@@ -90,21 +90,21 @@ const Conductor lf_brass = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.4224995, 0.41596287, 0.40688267),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.014192969, -0.013624363, -0.0142442435),  // c1: 
-    vec3(0.002750069, 0.0018184334, -0.0003843084),   // c2: 
-    vec3(-0.013451844, -0.015931338, -0.022102088),   // c3: 
-    vec3(-0.07764311, -0.07594602, -0.074483275),     // c4: 
-    vec3(-0.057833314, -0.0549469, -0.051087588)      // c5: 
+    vec3(0.42249948, 0.41596282, 0.40688264),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.014193013, -0.013624191, -0.01424437),   // c1: 
+    vec3(0.002750039, 0.0018187016, -0.0003841594),  // c2: 
+    vec3(-0.013451636, -0.015931964, -0.02210188),   // c3: 
+    vec3(-0.07764308, -0.07594618, -0.074483424),    // c4: 
+    vec3(-0.057833612, -0.054946333, -0.051087588)   // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.83247924, 0.71440005, 0.44934726),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.042790025, -0.03641066, -0.025350176),   // c1: 
-    vec3(0.025562882, 0.020827666, 0.0110064745),    // c2: 
-    vec3(0.015206635, 0.0070174932, -0.0050050914),  // c3: 
-    vec3(-0.13221592, -0.11567828, -0.07749814),     // c4: 
-    vec3(-0.12762237, -0.107916296, -0.06761435)     // c5: 
+    vec3(0.83247924, 0.71440005, 0.44934726),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.04279007, -0.03641057, -0.025350243),   // c1: 
+    vec3(0.025562942, 0.020827621, 0.011006519),    // c2: 
+    vec3(0.015206754, 0.0070168376, -0.005005002),  // c3: 
+    vec3(-0.13221595, -0.11567819, -0.07749818),    // c4: 
+    vec3(-0.12762225, -0.10791618, -0.067614496)    // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -154,8 +154,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec3 w)
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -175,7 +174,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -192,7 +191,7 @@ float lf_ggx_projection(vec3 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -234,11 +233,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -248,7 +247,7 @@ vec3 lf_amount(Curve curve, float s) {
 
 // The squared width of a lobe of this width, seen by way of slopes that spread it.
 vec2 lf_blurred2(vec2 width, float spread) {
-    vec2 shared_ = width * spread / max(width + spread, 1e-14);
+    vec2 shared_ = width * spread / (width + spread);
     return width * width + spread * spread + 3.173 * (shared_ * shared_);
 }
 
@@ -270,15 +269,9 @@ vec2 lf_blurred2(vec2 width, vec2 spread) {
     return width * width + spread * spread + 3.173 * (shared_ * shared_);
 }
 
-// The squared width of a lobe of this width, seen by way of slopes that spread it.
-vec2 lf_blurred22(vec2 width, float spread) {
-    vec2 shared_ = width * spread / (width + spread);
-    return width * width + spread * spread + 3.173 * (shared_ * shared_);
-}
-
 // Width of the lobe of light that met a base of width alpha twice, and the coat in between.
 vec2 lf_wider(vec2 alpha, float coat_alpha) {
-    return sqrt(lf_blurred22(sqrt(lf_blurred2(alpha, alpha)), 0.4 * coat_alpha));
+    return sqrt(lf_blurred2(sqrt(lf_blurred2(alpha, alpha)), 0.4 * coat_alpha));
 }
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
@@ -306,7 +299,7 @@ float lf_seen(vec3 yi, vec3 yo, float h2, vec2 width) {
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
 vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = min(wi.z, wo.z) > 0.0;
+    bool lit = min(wi.z, wo.z) > 1e-07;
     Crossing crossing = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_lacquer.eta);

@@ -24,8 +24,7 @@ const Conductor lf_steel = Conductor(
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -36,17 +35,19 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    bvec3 metal = lessThan(p, vec3(0.0));
+    vec3 b = mix(vec3(1.0), larger, metal);
+    vec3 twice_abc = mix(larger, nk, metal) * (2.0 * c);
+    vec3 even = b * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = b * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // Anisotropic GGX density of facet normals (Burley 2012, eq. 13).
@@ -66,12 +67,12 @@ float lf_ggx_projection_anisotropic(vec3 w, float alpha_x, float alpha_y) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
 vec3 lf_evaluate(vec3 wi, vec3 wo) {
-    bool lit = min(wi.z, wo.z) > 0.0;
+    bool lit = min(wi.z, wo.z) > 1e-07;
     vec3 F = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_steel.eta, lf_steel.k);
     float D = lf_ggx_d_anisotropic(lf_half_vector(wi, wo), lf_steel.alpha_x, lf_steel.alpha_y);
     float projection_i = lf_ggx_projection_anisotropic(wi, lf_steel.alpha_x, lf_steel.alpha_y);

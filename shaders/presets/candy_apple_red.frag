@@ -182,8 +182,7 @@ float lf_lost_variance(float distance, float half_distance) {
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -203,7 +202,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -220,7 +219,7 @@ float lf_ggx_projection(vec3 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -245,7 +244,7 @@ float lf_with_second_facet(float T, float gain) {
 
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = dot(w.xy, w.xy) / (1.0 + w.z);
+    float one_minus = 1.0 - w.z;
     return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
@@ -292,17 +291,18 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
-    float m = 0.5 * (1.0 - sine) / (n * cosine);
-    return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
+    float rise = 1.0 - sine;
+    float width = 2.0 * alpha * n * cosine;
+    return 0.5 - 0.5 * rise / sqrt(width * width + rise * rise);
 }
 
 // Density of a tilted flake's facet normals, their squared width alpha2: Beckmann's, moved among slopes (Olano and Baker 2010, eq. 7).
@@ -323,12 +323,17 @@ float lf_beckmann_projection(vec3 w, float alpha) {
     return w.z * lf_erf(q) + slope * exp(-q * q) * 0.5641896;
 }
 
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
 vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float kept = lf_kept_tilt(distance, lf_flakes.half_distance);
     vec2 tilt = lf_flake_tilt(uv, lf_flakes.per_uv, lf_flakes.sigma * kept, uint(lf_flakes.seed));
     float lost = lf_lost_variance(distance, lf_flakes.half_distance);
-    bool lit = min(wi.z, wo.z) > 0.0;
+    bool lit = min(wi.z, wo.z) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_candy.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_candy.alpha);
     float projection_i = lf_ggx_projection(wi, lf_candy.alpha);
@@ -366,7 +371,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    float lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    float lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith2(wi.z, wo.z, projection_i, projection_o);
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total = spread + 1.6817929 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
     total = total + pow(lf_candy.alpha, 1.5);
@@ -379,7 +384,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith2(wi.z, wo.z, projection_i, projection_o);
     lobes = lobe + q * lobes;
     total = spread + pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
     width = pow(total, 0.6666667);
@@ -390,7 +395,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith2(wi.z, wo.z, projection_i, projection_o);
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * (F2 * directional) * lobes;
     return lit ? f2 : vec3(0.0);

@@ -36,14 +36,13 @@ const CarPaint lf_paint = CarPaint(
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Schlick 1994, eq. 15, from the reflectance at normal incidence.
@@ -56,8 +55,8 @@ float lf_fresnel_schlick(float c, float f0) {
 // G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10).
 float lf_v_cavity(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float NoH_over_c = 2.0 * s.w / max(dot(s, s), 1e-20);
-    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(max(wi.w, wo.w), 1e-14));
+    float NoH_over_c = 2.0 * s.w / dot(s, s);
+    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(wi.w, wo.w));
 }
 
 // Beckmann density of facet normals (Cook and Torrance 1982, eq. 14, normalised).
@@ -71,7 +70,7 @@ float lf_beckmann_d(vec4 h, float alpha) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     vec4 h = lf_half_vector(wi, wo);
     float c = lf_half_cosine(wi, wo);
     float V = lf_v_cavity(wi, wo);

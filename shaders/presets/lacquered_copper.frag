@@ -88,21 +88,21 @@ const Conductor lf_copper = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.45706707, 0.35456714, 0.18230677),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.06396117, -0.039953552, -0.013034441),  // c1: 
-    vec3(0.02226162, 0.01588045, 0.008814532),      // c2: 
-    vec3(0.04693106, 0.033246875, 0.021665096),     // c3: 
-    vec3(-0.12128475, -0.09275427, -0.0456035),     // c4: 
-    vec3(-0.115383446, -0.08750671, -0.046186537)   // c5: 
+    vec3(0.45706707, 0.35456717, 0.18230677),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.06396136, -0.03995357, -0.013034504),   // c1: 
+    vec3(0.022261709, 0.015880331, 0.008814562),    // c2: 
+    vec3(0.046931535, 0.033247024, 0.021665335),    // c3: 
+    vec3(-0.12128489, -0.09275421, -0.04560356),    // c4: 
+    vec3(-0.115383804, -0.08750686, -0.046186805)   // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.7820461, 0.45333123, 0.26108205),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.08314325, -0.046439372, -0.025496382),  // c1: 
-    vec3(0.020463213, 0.014472969, 0.018237017),    // c2: 
-    vec3(0.06437707, 0.038382053, 0.04658191),      // c3: 
-    vec3(-0.14681765, -0.09573686, -0.07114419),    // c4: 
-    vec3(-0.15313518, -0.097661614, -0.08303)       // c5: 
+    vec3(0.78204614, 0.45333123, 0.26108205),       // c0: coefficients of the powers of the curves' argument
+    vec3(-0.08314319, -0.046439297, -0.025496412),  // c1: 
+    vec3(0.02046296, 0.014473014, 0.018237032),     // c2: 
+    vec3(0.06437683, 0.038381755, 0.046581894),     // c3: 
+    vec3(-0.14681733, -0.09573689, -0.0711442),     // c4: 
+    vec3(-0.15313488, -0.09766132, -0.083030015)    // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -152,8 +152,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -173,7 +172,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -190,7 +189,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -232,11 +231,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -283,7 +282,7 @@ float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     Crossing crossing = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_lacquer.eta);

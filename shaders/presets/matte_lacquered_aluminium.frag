@@ -88,21 +88,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.5982471, 0.5957608, 0.5869738),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.059255876, -0.05873581, -0.054995134),   // c1: 
-    vec3(-0.06424618, -0.06397264, -0.063012995),    // c2: 
-    vec3(-0.030506045, -0.031116545, -0.034228176),  // c3: 
-    vec3(-0.113144904, -0.11236225, -0.11036454),    // c4: 
-    vec3(-0.09669936, -0.09563586, -0.092008114)     // c5: 
+    vec3(0.59824705, 0.5957608, 0.5869738),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.059255846, -0.058735907, -0.054994784),  // c1: 
+    vec3(-0.06424585, -0.06397296, -0.06301309),     // c2: 
+    vec3(-0.030506521, -0.03111589, -0.03422928),    // c3: 
+    vec3(-0.11314508, -0.11236206, -0.11036451),     // c4: 
+    vec3(-0.09669903, -0.09563628, -0.09200752)      // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.7571852, 0.74703944, 0.73860687),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.06868844, -0.067933336, -0.06493274),      // c1: 
-    vec3(0.0015773475, 0.00059743226, -0.0011480153),  // c2: 
-    vec3(0.07874924, 0.07603121, 0.06974131),          // c3: 
-    vec3(-0.15356565, -0.15057847, -0.14713499),       // c4: 
-    vec3(-0.18380642, -0.17983341, -0.17371714)        // c5: 
+    vec3(0.7571853, 0.74703944, 0.73860687),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.06868835, -0.06793353, -0.06493248),     // c1: 
+    vec3(0.0015774369, 0.00059732795, -0.00114806),  // c2: 
+    vec3(0.07874936, 0.076031506, 0.06974125),       // c3: 
+    vec3(-0.1535654, -0.15057829, -0.14713502),      // c4: 
+    vec3(-0.18380666, -0.17983365, -0.17371696)      // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -152,8 +152,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -173,7 +172,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -190,7 +189,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -232,11 +231,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -283,7 +282,7 @@ float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     Crossing crossing = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_lacquer.eta);

@@ -91,7 +91,7 @@ const Flakes lf_flakes = Flakes(
 
 const vec3 lf_flakes_returned = vec3(1.1343322, 1.0002759, 1.0001109);
 
-const vec3 lf_flakes_lobes = vec3(0.38999027, 0.39579827, 0.40050954);
+const vec3 lf_flakes_lobes = vec3(0.3899902, 0.3957982, 0.40050954);
 
 // log(1 + x) without the cancellation near 0.
 float lf_log1p(float x) {
@@ -209,8 +209,7 @@ float lf_lost_variance(float distance, float half_distance) {
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -230,7 +229,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -247,7 +246,7 @@ float lf_ggx_projection(vec3 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -272,7 +271,7 @@ float lf_with_second_facet(float T, float gain) {
 
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec3 w, float scale, float alpha) {
-    float one_minus = dot(w.xy, w.xy) / (1.0 + w.z);
+    float one_minus = 1.0 - w.z;
     return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
@@ -313,8 +312,9 @@ float lf_fresnel_dielectric2(float c, float eta) {
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
-    float m = 0.5 * (1.0 - sine) / (n * cosine);
-    return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
+    float rise = 1.0 - sine;
+    float width = 2.0 * alpha * n * cosine;
+    return 0.5 - 0.5 * rise / sqrt(width * width + rise * rise);
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -336,19 +336,6 @@ vec3 lf_transmittance(vec3 tau, float path) {
     return exp(-(tau * path));
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec3 lf_half_vector2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec3 wi, vec3 wo) {
-    vec3 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
@@ -357,11 +344,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // Density of a tilted flake's facet normals, their squared width alpha2: Beckmann's, moved among slopes (Olano and Baker 2010, eq. 7).
@@ -379,12 +366,17 @@ float lf_beckmann_projection(vec3 w, float alpha) {
     return w.z * lf_erf(q) + slope * exp(-q * q) * 0.5641896;
 }
 
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+}
+
 // BRDF [1/sr] of unit directions in the surface frame, normal (0, 0, 1); without the cosine.
 vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float kept = lf_kept_tilt(distance, lf_flakes.half_distance);
     vec2 tilt = lf_flake_tilt(uv, lf_flakes.per_uv, lf_flakes.sigma * kept, uint(lf_flakes.seed));
     float lost = lf_lost_variance(distance, lf_flakes.half_distance);
-    bool lit = min(wi.z, wo.z) > 0.0;
+    bool lit = min(wi.z, wo.z) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_clear_coat.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_clear_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_clear_coat.alpha);
@@ -448,8 +440,8 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     vec3 diffuse = lf_transmittance(lf_colour.tau, straight + added);
     wi = lf_steer(i2.w, 0.5 * i2.drift);
     wo = lf_steer(o2.w, 0.5 * o2.drift);
-    h = lf_half_vector2(wi, wo);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(wi, wo), lf_flakes.eta, lf_flakes.k);
+    h = lf_half_vector(wi, wo);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_flakes.eta, lf_flakes.k);
     F2 = lf_flakes.coverage * F2;
     R = 0.5 * (R_i + R_o);
     float t = sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma);
@@ -469,7 +461,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith2(wi.z, wo.z, projection_i, projection_o);
     vec3 lobes2 = lobe / max(1.0 - q2, 1e-06);
     total = spread + 1.6817929 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
     total = total + pow(lf_colour.alpha, 1.5);
@@ -482,7 +474,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith2(wi.z, wo.z, projection_i, projection_o);
     lobes2 = lobe + q2 * lobes2;
     total = spread + pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
     width = pow(total, 0.6666667);
@@ -493,7 +485,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith2(wi.z, wo.z, projection_i, projection_o);
     lobes2 = lobe + q2 * lobes2;
     vec3 f2 = f + throughput * (F2 * directional) * lobes2;
     vec3 albedo = (1.0 - lf_flakes.coverage) * lf_flakes.albedo;

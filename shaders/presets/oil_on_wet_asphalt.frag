@@ -92,8 +92,7 @@ float lf_atan2(float y, float x) {
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.
@@ -130,7 +129,7 @@ vec3 lf_fresnel_schlick(float c, vec3 f0) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -147,7 +146,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -181,7 +180,7 @@ vec3 lf_with_second_facet(vec3 T, float gain) {
 
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
-    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
+    float one_minus = 1.0 - w.w;
     return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
@@ -245,7 +244,7 @@ float lf_oren_nayar_full(vec4 wi, vec4 wo, float albedo, float sigma) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     float c = lf_rarer_cosine(lf_half_cosine(wi, wo), lf_water.eta);
     vec3 reflected = lf_fresnel_schlick(c, lf_film_on_coat(lf_water, c));
     vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);

@@ -278,18 +278,19 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
     vec3 larger = sqrt(0.5 * (q + abs(p)));
-    vec3 a = mix(larger, nk / larger, lessThan(p, vec3(0.0)));
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    bvec3 metal = lessThan(p, vec3(0.0));
+    vec3 b = mix(vec3(1.0), larger, metal);
+    vec3 twice_abc = mix(larger, nk, metal) * (2.0 * c);
+    vec3 even = b * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = b * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -309,7 +310,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -326,7 +327,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -346,7 +347,7 @@ float lf_transmittance_dielectric2(float c, float eta) {
 
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
-    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
+    float one_minus = 1.0 - w.w;
     return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
@@ -393,37 +394,23 @@ vec3 lf_fresnel_conductor2(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
-    float m = 0.5 * (1.0 - sine) / (n * cosine);
-    return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
+    float rise = 1.0 - sine;
+    float width = 2.0 * alpha * n * cosine;
+    return 0.5 - 0.5 * rise / sqrt(width * width + rise * rise);
 }
 
 // The same by the depth of scattering within `tau`, and paths in thicknesses: 1 / cos, or longer below a rough boundary.
 vec3 lf_once_back(float phase, vec3 tau_s, vec3 tau, float path_i, float path_o) {
     return tau_s * (phase * path_i * path_o) * lf_mean_transmittance(tau * (path_i + path_o));
-}
-
-// Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
-vec3 lf_fresnel_conductor3(float c, vec3 eta, vec3 k) {
-    float c2 = c * c;
-    float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
 }
 
 // The same for light that goes on to the other side.
@@ -476,7 +463,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     float g = lf_field_at(uv, lf_patina_growth);
     Cover cover = lf_cover_at(g, lf_patina_growth);
     float thickness = lf_thickness_at(g, lf_patina_growth, lf_patina_crust.blur);
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     vec3 t = lf_patina_coat.tau * thickness;
     vec3 t2 = lf_patina_coat.tau_s * thickness;
     vec3 t3 = t + t2;
@@ -577,7 +564,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     t18 = 1.0 / max(1.0 - t13 - t15 * t18 - t16 * t20, 1e-06);
     t12 = (t12 - t15 * t6 - t16 * t9) * t18;
     t13 = (t13 - t15 * t7 - t16 * t10) * t18;
-    bool lit2 = min(wi.w, wo.w) > 0.0;
+    bool lit2 = min(wi.w, wo.w) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_patina_coat.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_patina_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_patina_coat.alpha);
@@ -637,12 +624,12 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     vec3 f3 = lf_once_back(0.07957747, t2, t3, path, path2);
     Fluence beam_i = lf_fluence(t3, path);
     Fluence beam_o = lf_fluence(t3, path2);
-    vec3 up_i = lf_fresnel_conductor3(i.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path);
-    vec3 up_o = lf_fresnel_conductor3(o.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path2);
+    vec3 up_i = lf_fresnel_conductor2(i.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path);
+    vec3 up_o = lf_fresnel_conductor2(o.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path2);
     vec3 f4 = lf_once_by_mirror(0.07957747, 0.07957747, t2, t3, path, path2, up_i, up_o);
     f3 = f3 + f4;
-    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor3(i.w.w, lf_base.eta, lf_base.k), R_i);
-    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor3(o.w.w, lf_base.eta, lf_base.k), R_o);
+    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor2(i.w.w, lf_base.eta, lf_base.k), R_i);
+    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor2(o.w.w, lf_base.eta, lf_base.k), R_o);
     f2 = f2 + throughput * (f3 + lf_exchanged(Haze(t3, (t5 - t17 * t8 - t14 * ((t11 - t15 * t5 - t16 * t8) * t18)) * t4, (t6 - t17 * t9 - t14 * t12) * t4, (t7 - t17 * t10 - t14 * t13) * t4, (t9 - t20 * t12) * t4, (t10 - t20 * t13) * t4, t13 * t4), beam_i, beam_o));
     vec3 patina = lit2 ? f2 : vec3(0.0);
     TwoFlux layer = lf_kubelka_munk(lf_patina_crust.absorbed * thickness, lf_patina_crust.scattered * thickness);

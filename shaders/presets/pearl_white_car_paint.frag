@@ -105,8 +105,7 @@ const vec3 lf_white_returned = vec3(1.9208039, 1.9228877, 2.048475);
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -126,7 +125,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -143,7 +142,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -168,7 +167,7 @@ float lf_with_second_facet(float T, float gain) {
 
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
-    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
+    float one_minus = 1.0 - w.w;
     return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
@@ -235,8 +234,9 @@ vec3 lf_fresnel_schlick(float c, vec3 f0) {
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
-    float m = 0.5 * (1.0 - sine) / (n * cosine);
-    return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
+    float rise = 1.0 - sine;
+    float width = 2.0 * alpha * n * cosine;
+    return 0.5 - 0.5 * rise / sqrt(width * width + rise * rise);
 }
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
@@ -276,7 +276,7 @@ Crossing2 lf_cross(Interface interface_, Coat2 coat, vec4 w, vec4 air) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_clear_coat.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_clear_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_clear_coat.alpha);

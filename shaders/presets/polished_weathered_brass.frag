@@ -192,8 +192,7 @@ vec3 lf_kubelka_munk_over2(TwoFlux layer, vec3 substrate) {
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -215,7 +214,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -239,7 +238,7 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 float lf_transmittance_dielectric(float c, float eta) {
     float g = sqrt(max((eta - 1.0) * (eta + 1.0) + c * c, 0.0));
     float eta2 = eta * eta;
-    float perpendicular = 1.0 / max(c + g, 1e-14);
+    float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / max(eta2 * c + g, 1e-14);
     float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return eta == 1.0 ? 1.0 : passed;
@@ -260,11 +259,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
@@ -273,10 +272,15 @@ float lf_ggx_projection2(vec4 w, float alpha) {
     return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
 }
 
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
+}
+
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     Cover cover = lf_cover_at(lf_field_at(uv, lf_verdigris_growth), lf_verdigris_growth);
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     float t = cover.covered * lf_verdigris_pigment.thickness;
     float through = lf_see_through(t);
     float share = 1.0 - through;
@@ -312,7 +316,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     D = lf_ggx_d(lf_half_vector(wi, wo), lf_brass.alpha);
     projection_i = lf_ggx_projection2(wi, lf_brass.alpha);
     projection_o = lf_ggx_projection2(wo, lf_brass.alpha);
-    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
     vec3 metal = F2 * (D * V);
     vec3 f = covered * (boundary + body) + bare * metal;
     return lit ? f : vec3(0.0);

@@ -88,21 +88,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.50211984, 0.09377763, 0.11481093),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.032300524, 0.004894279, 0.004833743),    // c1: 
-    vec3(0.0050751716, 0.0025949478, 0.0030900314),  // c2: 
-    vec3(0.0680446, 0.010556936, 0.013551533),       // c3: 
-    vec3(-0.06660481, -0.006610181, -0.009167843),   // c4: 
-    vec3(-0.09992492, -0.012514889, -0.01660861)     // c5: 
+    vec3(0.5021198, 0.09377761, 0.11481092),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.032300614, 0.0048942734, 0.004833758),   // c1: 
+    vec3(0.0050757676, 0.0025949627, 0.003090065),   // c2: 
+    vec3(0.06804496, 0.010556966, 0.013551474),      // c3: 
+    vec3(-0.066605225, -0.006610185, -0.009167865),  // c4: 
+    vec3(-0.09992522, -0.012514934, -0.016608581)    // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.7191085, 0.22766027, 0.25847566),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.03043969, -0.0028399155, -0.0034499466),  // c1: 
-    vec3(0.008312583, 0.009988785, 0.009674951),      // c2: 
-    vec3(0.032741487, 0.023314953, 0.023171186),      // c3: 
-    vec3(-0.070250124, -0.027309395, -0.029939637),   // c4: 
-    vec3(-0.07784718, -0.03523788, -0.037403613)      // c5: 
+    vec3(0.71910846, 0.22766027, 0.2584757),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.03043975, -0.002839841, -0.0034499615),  // c1: 
+    vec3(0.008312583, 0.009988703, 0.00967481),      // c2: 
+    vec3(0.032741666, 0.023314744, 0.023171365),     // c3: 
+    vec3(-0.07025018, -0.02730935, -0.029939547),    // c4: 
+    vec3(-0.07784706, -0.03523773, -0.037403673)     // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -152,8 +152,7 @@ Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w)
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -173,7 +172,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -190,7 +189,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -232,11 +231,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The polynomial at s; an energy is never below 0.
@@ -283,7 +282,7 @@ float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     Crossing crossing = lf_pass_interface(lf_oxide_interface, lf_oxide.eta, lf_oxide.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_oxide_interface, lf_oxide.eta, lf_oxide.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_oxide.eta);

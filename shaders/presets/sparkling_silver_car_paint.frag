@@ -120,14 +120,13 @@ float lf_lost_variance(float distance, float half_distance) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Schlick 1994, eq. 15, from the reflectance at normal incidence.
@@ -140,8 +139,8 @@ float lf_fresnel_schlick(float c, float f0) {
 // G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10).
 float lf_v_cavity(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    float NoH_over_c = 2.0 * s.z / max(dot(s, s), 1e-20);
-    return min(0.25 / max(wi.z * wo.z, 1e-14), 0.5 * NoH_over_c / max(max(wi.z, wo.z), 1e-14));
+    float NoH_over_c = 2.0 * s.z / dot(s, s);
+    return min(0.25 / max(wi.z * wo.z, 1e-14), 0.5 * NoH_over_c / max(wi.z, wo.z));
 }
 
 // Density of a tilted flake's facet normals, their squared width alpha2: Beckmann's, moved among slopes (Olano and Baker 2010, eq. 7).
@@ -169,7 +168,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float kept = lf_kept_tilt(distance, lf_paint.half_distance);
     vec2 slope = lf_flake_tilt(uv, lf_paint.per_uv, kept, uint(lf_paint.seed));
     float lost = lf_lost_variance(distance, lf_paint.half_distance);
-    bool lit = min(wi.z, wo.z) > 0.0;
+    bool lit = min(wi.z, wo.z) > 1e-07;
     vec3 h = lf_half_vector(wi, wo);
     float c = lf_half_cosine(wi, wo);
     float V = lf_v_cavity(wi, wo);

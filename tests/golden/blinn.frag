@@ -35,7 +35,7 @@ vec3 lf_log1p(vec3 x) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // 1 - NoH, without the cancellation near the normal.
@@ -52,7 +52,7 @@ float lf_cosine_power(float one_minus, float exponent) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     vec4 h = lf_half_vector(wi, wo);
     float power = lf_cosine_power(lf_normal_distance(h), lf_base.exponent);
     vec3 value = lf_base.ks * ((lf_base.exponent + 8.0) * 0.039788734 * power) + lf_base.kd / 3.1415927;

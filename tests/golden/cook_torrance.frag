@@ -26,8 +26,7 @@ const CookTorrance lf_base = CookTorrance(
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
@@ -38,17 +37,17 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // Beckmann density of facet normals (Cook and Torrance 1982, eq. 14, normalised).
@@ -63,13 +62,13 @@ float lf_beckmann_d(vec4 h, float alpha) {
 // G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10).
 float lf_v_cavity(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float NoH_over_c = 2.0 * s.w / max(dot(s, s), 1e-20);
-    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(max(wi.w, wo.w), 1e-14));
+    float NoH_over_c = 2.0 * s.w / dot(s, s);
+    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(wi.w, wo.w));
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     vec3 F = lf_base.ks * lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_base.eta, lf_base.k);
     float D = lf_beckmann_d(lf_half_vector(wi, wo), lf_base.alpha);
     float V = lf_v_cavity(wi, wo);

@@ -76,8 +76,7 @@ const Conductor lf_base = Conductor(
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -97,7 +96,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -114,7 +113,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -139,7 +138,7 @@ float lf_with_second_facet(float T, float gain) {
 
 // Path added near grazing angles, where the facets that face the light take most of it.
 float lf_drift(vec4 w, float scale, float alpha) {
-    float one_minus = dot(w.xyz, w.xyz) / (1.0 + w.w);
+    float one_minus = 1.0 - w.w;
     return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
@@ -195,8 +194,9 @@ float lf_fresnel_dielectric2(float c, float eta) {
 
 // Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n.
 float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
-    float m = 0.5 * (1.0 - sine) / (n * cosine);
-    return 0.5 - 0.5 * m / sqrt(alpha * alpha + m * m);
+    float rise = 1.0 - sine;
+    float width = 2.0 * alpha * n * cosine;
+    return 0.5 - 0.5 * rise / sqrt(width * width + rise * rise);
 }
 
 // Cosine below a boundary of relative index `eta` (Snell's law); 0 under total internal reflection.
@@ -221,19 +221,6 @@ Crossing lf_cross2(Interface interface_, Coat coat, vec4 w, vec4 air) {
     return Crossing(below, T, lf_slope_spread2(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
-// The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
-}
-
-// The cosine between either direction and their half vector.
-float lf_half_cosine2(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float s2 = dot(s, s);
-    return min(0.5 * sqrt(s2), 1.0);
-}
-
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
@@ -242,21 +229,16 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
-}
-
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_coat.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
@@ -324,8 +306,8 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     directional = lf_transmittance(lf_primer.tau, straight + 0.5 * added);
     wi = lf_steer(i2.w, 0.5 * i2.drift);
     wo = lf_steer(o2.w, 0.5 * o2.drift);
-    h = lf_half_vector2(wi, wo);
-    vec3 F2 = lf_fresnel_conductor(lf_half_cosine2(wi, wo), lf_base.eta, lf_base.k);
+    h = lf_half_vector(wi, wo);
+    vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_base.eta, lf_base.k);
     vec3 R2 = 0.5 * (R_i2 + R_o2);
     edge_i = lf_edge_reflection(sin_i, i2.w.w, lf_primer_interface.n, lf_base.alpha);
     edge_o = lf_edge_reflection(sin_o, o2.w.w, lf_primer_interface.n, lf_base.alpha);
@@ -338,7 +320,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe / max(1.0 - q, 1e-06);
     total = spread + 2.0 * pow(lf_base.alpha, 1.34);
@@ -347,7 +329,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     total = spread + pow(lf_base.alpha, 1.34);
@@ -355,7 +337,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     f2 = f2 + throughput3 * (F2 * directional) * lobes;

@@ -35,14 +35,13 @@ const Conductor lf_base = Conductor(
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -68,8 +67,8 @@ float lf_ggx_d(vec4 h, float alpha) {
 // G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10).
 float lf_v_cavity(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float NoH_over_c = 2.0 * s.w / max(dot(s, s), 1e-20);
-    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(max(wi.w, wo.w), 1e-14));
+    float NoH_over_c = 2.0 * s.w / dot(s, s);
+    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(wi.w, wo.w));
 }
 
 // Cosine below a boundary of relative index `eta` (Snell's law); 0 under total internal reflection.
@@ -101,11 +100,11 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / ((q + c2 + twice_ac) * (even + odd));
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
@@ -116,7 +115,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
@@ -126,7 +125,7 @@ vec3 lf_transmittance(vec3 tau, float path) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     vec4 h = lf_half_vector(wi, wo);
     float c = lf_half_cosine(wi, wo);
     float F = lf_fresnel_dielectric(c, lf_coat.eta);
@@ -139,7 +138,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     vec4 wo_below = lf_refract_about_facet(wo, h, c, c_below, lf_coat.eta);
     float T12 = lf_transmittance_dielectric(c, lf_coat.eta);
     float t = 1.0 - G * F;
-    bool lit2 = min(wi_below.w, wo_below.w) > 0.0;
+    bool lit2 = min(wi_below.w, wo_below.w) > 1e-07;
     D = lf_ggx_d(h, lf_base.alpha);
     float projection_i = lf_ggx_projection(wi_below, lf_base.alpha);
     float projection_o = lf_ggx_projection(wo_below, lf_base.alpha);

@@ -50,7 +50,7 @@ float lf_lafortune_log_product(vec4 wi, vec4 wo, vec3 C) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     float log_product = lf_lafortune_log_product(wi, wo, vec3(lf_base.cx, lf_base.cx, lf_base.cz));
     vec3 value = lf_base.ks * exp(min(lf_base.exponent * log_product, 60.0)) + lf_base.kd / 3.1415927;
     return lit ? value : vec3(0.0);

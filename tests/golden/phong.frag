@@ -48,7 +48,7 @@ float lf_cosine_power(float one_minus, float exponent) {
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     float power = lf_cosine_power(lf_mirror_distance(wi, wo), lf_base.exponent);
     vec3 value = lf_base.ks * ((lf_base.exponent + 2.0) * 0.15915494 * power) + lf_base.kd / 3.1415927;
     return lit ? value : vec3(0.0);

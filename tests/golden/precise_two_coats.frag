@@ -136,28 +136,27 @@ const Conductor lf_base = Conductor(
 );
 
 const Curve lf_coat_again = Curve(
-    vec3(0.33393082, 0.4352906, 0.299388),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.024904296, -0.035086997, -0.031151477),  // c1: 
-    vec3(0.031484544, 0.028582096, 0.016576536),     // c2: 
-    vec3(0.051282704, 0.029458791, 0.015581995),     // c3: 
-    vec3(-0.070911855, -0.07764098, -0.052617982),   // c4: 
-    vec3(-0.07806289, -0.07196063, -0.048757493)     // c5: 
+    vec3(0.33393088, 0.43529066, 0.29938802),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.024904296, -0.035087094, -0.031151395),  // c1: 
+    vec3(0.031484477, 0.028581798, 0.016576521),     // c2: 
+    vec3(0.051282495, 0.029459119, 0.015581727),     // c3: 
+    vec3(-0.07091175, -0.07764073, -0.052618027),    // c4: 
+    vec3(-0.07806277, -0.07196075, -0.048757315)     // c5: 
 );
 
 const Curve lf_coat_rest = Curve(
-    vec3(0.47854635, 0.37205938, 0.23941284),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.010893799, -0.015971012, -0.021451183),   // c1: 
-    vec3(0.02565062, 0.007946074, 0.0048397034),      // c2: 
-    vec3(0.0055758357, -0.01969567, -0.00030514598),  // c3: 
-    vec3(-0.055335462, -0.028815418, -0.023669586),   // c4: 
-    vec3(-0.041611016, -0.0074115098, -0.018223673)   // c5: 
+    vec3(0.47854635, 0.3720594, 0.23941283),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.01089371, -0.015971087, -0.021451086),    // c1: 
+    vec3(0.025650427, 0.007946163, 0.0048397332),     // c2: 
+    vec3(0.0055757165, -0.01969564, -0.0003053546),   // c3: 
+    vec3(-0.055335283, -0.028815478, -0.023669548),   // c4: 
+    vec3(-0.041610956, -0.0074114203, -0.018223554)   // c5: 
 );
 
 // The cosine between either direction and their half vector.
 float lf_half_cosine(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    float s2 = max(dot(s, s), 1e-20);
-    return min(0.5 * sqrt(s2), 1.0);
+    return 0.5 * sqrt(dot(s, s));
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -177,7 +176,7 @@ float lf_fresnel_dielectric(float c, float eta) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec4 lf_half_vector(vec4 wi, vec4 wo) {
     vec4 s = wi + wo;
-    return s * inversesqrt(max(dot(s, s), 1e-20));
+    return s * inversesqrt(dot(s, s));
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
@@ -194,7 +193,7 @@ float lf_ggx_projection(vec4 w, float alpha) {
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
 float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
 }
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -331,16 +330,16 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 nk = eta * k;
     vec3 q = sqrt(p * p + 4.0 * nk * nk);
     vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 a = nk / larger;
-    vec3 twice_ac = a * (2.0 * c);
-    vec3 even = q * c2 + s2 * s2;
-    vec3 odd = twice_ac * s2;
-    return (q + c2 - twice_ac) * even / max((q + c2 + twice_ac) * (even + odd), 1e-12);
+    vec3 twice_abc = nk * (2.0 * c);
+    vec3 even = larger * (q * c2 + s2 * s2);
+    vec3 odd = twice_abc * s2;
+    vec3 across = larger * (q + c2);
+    return (across - twice_abc) * even / ((across + twice_abc) * (even + odd));
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
 vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+    bool lit = min(wi.w, wo.w) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_coat.eta);
     float D = lf_ggx_d(lf_half_vector(wi, wo), lf_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_coat.alpha);

@@ -251,8 +251,8 @@ def _returned(target: Lobe, below: Below, options: Corrected) -> Colour:
 @chunk
 def edge_reflection(sine: Scalar, cosine: Scalar, n: Scalar, alpha: Scalar) -> Scalar:
     """Part of a lobe of width alpha that leaves the escape cone: sine in air, cosine in the medium of index n."""
-    m = safe_divide(0.5 * (1.0 - sine), n * cosine)
-    return where(n > 1.0, 0.5 - safe_divide(0.5 * m, safe_sqrt(alpha * alpha + m * m)), 0.0)
+    rise, width = 1.0 - sine, 2.0 * alpha * n * cosine
+    return where(n > 1.0, 0.5 - safe_divide(0.5 * rise, safe_sqrt(width * width + rise * rise)), 0.0)
 
 
 def _per_axis(widths: list[Width], width_along: Callable[[int], Scalar]) -> Width:

@@ -28,15 +28,19 @@ def direction(part: jax.Array, cosine: Scalar) -> Direction:
     return jnp.concatenate([part, cosine[None]])
 
 
+LEAST_COSINE = 1e-7
+"""Of a direction above the surface: a unit vector in float32 does not tell on which side of 0 a smaller one is."""
+
+
 def both_above(wi: Direction, wo: Direction) -> Flag:
     """Whether both are above the surface."""
-    return jnp.minimum(wi[-1], wo[-1]) > 0.0
+    return jnp.minimum(wi[-1], wo[-1]) > LEAST_COSINE
 
 
 @jax.jit
-def above(lit: Flag, w: Direction) -> Direction:
-    """A direction where it is `lit`, else the normal: a guard of derivatives, for values that are then not used.
+def above(lit: Flag, w: Direction | Scalar) -> jax.Array:
+    """A direction, or its cosine, where it is `lit`, else the normal: a guard of derivatives, for values that are then not used.
 
     In a shader it is the direction itself, and what comes of one below the surface is not chosen.
     """
-    return where(lit, w, jnp.asarray(np.eye(len(w))[-1], w.dtype))
+    return where(lit, w, jnp.asarray(np.eye(len(w))[-1] if w.ndim else 1.0, w.dtype))

@@ -6,7 +6,7 @@ Indices are relative: the medium below divided by the medium above.
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_divide, safe_sqrt, where
+from .._chunk import chunk, divide, safe_divide, safe_sqrt, where
 from .._types import Colour, Scalar
 
 
@@ -50,12 +50,15 @@ def fresnel_conductor(c: Scalar, eta: Colour, k: Colour) -> Colour:
     q = jnp.sqrt(jnp.maximum(p * p + 4.0 * nk * nk, 1e-24))
     # a = sqrt((q + p) / 2) cancels where p < 0, as in every metal; there b = sqrt((q - p) / 2) does not and a = nk / b.
     larger = jnp.sqrt(0.5 * (q + jnp.abs(p)))
-    a = where(p < 0.0, nk / larger, larger)
-    twice_ac = a * (2.0 * c)
+    # All is multiplied by b, which spares the division.
+    metal = p < 0.0
+    b = where(metal, larger, 1.0)
+    twice_abc = where(metal, nk, larger) * (2.0 * c)
     # Rp is Rs (even - odd) / (even + odd), so that the mean of both is Rs even / (even + odd).
-    even = q * c2 + s2 * s2
-    odd = twice_ac * s2
-    return (q + c2 - twice_ac) * even / jnp.maximum((q + c2 + twice_ac) * (even + odd), 1e-12)
+    even = b * (q * c2 + s2 * s2)
+    odd = twice_abc * s2
+    across = b * (q + c2)
+    return divide((across - twice_abc) * even, (across + twice_abc) * (even + odd))
 
 
 @chunk

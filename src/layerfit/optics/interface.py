@@ -54,7 +54,7 @@ def rough_transmittance(c: Scalar, eta: Scalar, gain: Scalar) -> Colour:
 @chunk
 def drift(w: Direction, scale: Scalar, alpha: Scalar) -> Scalar:
     """Path added near grazing angles, where the facets that face the light take most of it."""
-    one_minus = sine2(w) / (1.0 + w[-1])
+    one_minus = 1.0 - w[-1]
     # (1 - NoW)^3.16 exp(-7 alpha (1 - NoW)), by one exponential.
     return scale * jnp.exp(3.16 * jnp.log(jnp.maximum(one_minus, 1e-30)) - 7.0 * alpha * one_minus)
 

@@ -163,5 +163,4 @@ def half_cosine(wi: Direction, wo: Direction) -> Scalar:
     """The cosine between either direction and their half vector."""
     # |wi + wo| / 2: the dot product with the half vector loses it near 0 (grazing, opposite).
     s = wi + wo
-    s2 = jnp.maximum(dot(s, s), 1e-20)
-    return jnp.minimum(0.5 * jnp.sqrt(s2), 1.0)
+    return 0.5 * jnp.sqrt(jnp.maximum(dot(s, s), 1e-20))

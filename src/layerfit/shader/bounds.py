@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from jax.extend.core import Literal
 
+from ..optics.directions import LEAST_COSINE
+
 ROUNDING = 1e-6
 """A result may be off by it, relative: an operation of a GPU by some units in the last place."""
 TRANSCENDENTAL = 1e-4
@@ -89,10 +91,12 @@ def inner_of(eqn: Any) -> tuple[Any, Sequence[Any]] | None:
 
 def _results(eqn: Any, given: list[Bounds], calls: Calls) -> list[Bounds]:
     name = eqn.params.get("name") if eqn.primitive.name in ("jit", "pjit") else eqn.primitive.name
-    if name == "above":  # used only where the direction's cosine, its last number, is above 0
+    if name == "above":  # used only where the direction's cosine, its last number, is above the least
         low, high = (np.broadcast_to(end, eqn.outvars[0].aval.shape).copy() for end in given[-1])
-        low[-1] = max(low[-1], 0.0)
+        low.flat[-1] = max(low.flat[-1], LEAST_COSINE)
         return [Bounds(low, high)]
+    if name == "half_cosine":  # of unit vectors
+        return [Bounds(0.0, 1.0 + ROUNDING)]
     if name == "fetch":  # the least and the largest of the table
         return [_together(given[0])]
     if name == "dot":
@@ -217,7 +221,7 @@ _RULES: dict[str, Callable[..., Bounds]] = {
     "sqrt": _increasing(np.sqrt, 0.0),
     "rsqrt": lambda eqn, a: _rounded(1.0 / np.sqrt(a.high), 1.0 / np.sqrt(np.maximum(a.low, 0.0))),
     "exp": _increasing(np.exp, by=TRANSCENDENTAL),
-    "log": lambda eqn, a: ANY,
+    "log": _increasing(lambda x: np.log(x), 0.0, TRANSCENDENTAL),
     "power": lambda eqn, a: _increasing(lambda x: x ** eqn.params["exponent"], 0.0, TRANSCENDENTAL)(eqn, a),
     "integer_pow": _power,
     "square": _power,

@@ -26,7 +26,7 @@ from ..surfaces.base import Surface
 from ..surfaces.flakes import FlakeLobe
 from .polynomial import Curve, Polynomial
 from .surface import Argument, Compact, Recipe, argument, at, best_argument, colour_of, cosines, half_root
-from .top import coat_lobe, filmed, hidden_cosine, reflectance_curve
+from .top import coat_lobe, filmed, hidden_cosine, left_curve, reflectance_curve
 
 ORDERS = 3
 MASKING = (1.14077, 0.0123766, 9.0)
@@ -65,6 +65,8 @@ class Covered:
     """Of the width that the coats add: squared widths of the lobes, one an order; of Beckmann's what is more than its own."""
     reflectance: Polynomial
     """Of four times the squared half cosine below; of a film of the root of the half cosine."""
+    left: Polynomial | None
+    """Of the path there and back: what absorption leaves; None where no polynomial follows it."""
     own2: Scalar
     """Squared width of its facets."""
     n: Scalar
@@ -76,9 +78,9 @@ class Covered:
 
     def way(self, NoW: Scalar, tilt: Scalar) -> LobeWay:
         """Follow one direction there."""
-        facet = 2.0 * argument("facet", NoW, tilt) - 1.0
-        way = lobe_way(self.passed, self.refracted, self.edge, self.n, facet, NoW)
-        return way if self.back is None else replace(way, R=self.back(facet))
+        x = 2.0 * argument("facet", NoW, tilt) - 1.0
+        way = lobe_way(self.passed, self.refracted, self.edge, self.n, x, NoW)
+        return way if self.back is None else replace(way, R=self.back(x))
 
     def meet(self, i: LobeWay, o: LobeWay, x2: Scalar, flake: "Tilted | None") -> Colour:
         """Its lobes [1/sr]; `x2` is the squared length of the sum of the directions' parts along the surface below the coats."""
@@ -86,7 +88,8 @@ class Covered:
         M2 = M * M
         h2 = M2 + x2
         F = self.reflectance(half_root(h2) if self.film else h2)
-        A = F if self.tau is None else F * jnp.exp(-(self.tau * (i.path + o.path)))
+        path = i.path + o.path
+        A = F if self.tau is None else F * (jnp.exp(-(self.tau * path)) if self.left is None else self.left(path))
         R = 0.5 * (i.R + o.R)
         q = A * (R + (1.0 - R) * (i.edge + o.edge))
         a2 = self.variance(i.width + o.width)
@@ -118,12 +121,12 @@ def lobe_way(
     refracted: Polynomial,
     edge: Polynomial,
     n: Scalar,
-    facet: Scalar,
+    x: Scalar,
     NoW: Scalar,
 ) -> LobeWay:
-    """Follow one direction to a boundary below coats; `facet` is the cosine of the mean facet as -1 to 1."""
+    """Follow one direction to a boundary below coats; x is the argument of `passed`."""
     sin2 = 1.0 - NoW * NoW
-    energy = passed(facet)
+    energy = passed(x)
     T, width = colour_of(energy), energy[-1]
     below = refracted(NoW)
     absorbs = jnp.ndim(below) > 0
@@ -322,7 +325,11 @@ def recipe(prepared: corrected.Prepared, name: str) -> Recipe:
     def build(fitted: Any) -> CorrectedStack:
         parts = {
             key: Covered(
-                **({"back": None} | {part: fitted[f"{key}.{part}"] for part in _PARTS if f"{key}.{part}" in fitted}), **rest
+                **(
+                    {"back": None, "left": None}
+                    | {part: fitted[f"{key}.{part}"] for part in _PARTS if f"{key}.{part}" in fitted}
+                ),
+                **rest,
             )
             for key, rest in fixed.items()
         }
@@ -341,7 +348,7 @@ def recipe(prepared: corrected.Prepared, name: str) -> Recipe:
     return Recipe(curves, build)
 
 
-_PARTS = ("passed", "refracted", "edge", "back", "variance", "reflectance")
+_PARTS = ("passed", "refracted", "edge", "back", "variance", "reflectance", "left")
 
 
 def _met(below: Any, lobe: Any) -> dict[str, Any]:
@@ -385,6 +392,10 @@ def _covered(
         "variance": Curve(width, grown if ggx else grown - own2, 1.0 / (grown - drawn), 6),
         "reflectance": reflectance_curve(lobe, cosine, 6),
     }
+    if above.extinction is not None:
+        path = np.linspace(2.0 * met["path"].min(), 2.0 * met["path"].max(), len(NoW))
+        if (left := left_curve(path, np.multiply.outer(path, np.asarray(above.extinction)))) is not None:
+            curves["left"] = left
     if depth > 1:
         curves["back"] = Curve(curves["passed"].x, met["R"])
     n = float(np.prod([float(coat.eta) for coat in coats[:depth]]))

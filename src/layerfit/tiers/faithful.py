@@ -17,7 +17,7 @@ from ..forms import faithful
 from ..layers import Coat
 from .polynomial import Curve, Polynomial
 from .surface import Compact, Recipe
-from .top import hidden_cosine
+from .top import facet_of, hidden_cosine
 
 
 @struct
@@ -84,19 +84,13 @@ def faithful_top(coat: Coat, i: FaithfulWay, o: FaithfulWay, lean2: Scalar) -> F
     s2 = lean2 + M2
     quarter = 0.25 * s2
     delta = (coat.eta - 1.0) * (coat.eta + 1.0)
-    c = jnp.sqrt(quarter)
-    g = jnp.sqrt(delta + quarter)
-    eta2 = coat.eta * coat.eta
-    across = (c + g) * (c + g)
-    along = (eta2 * c + g) * (eta2 * c + g)
-    rp = ((eta2 + 1.0) * quarter - 1.0) * across
-    product = across * along
-    F = divide((along * along + rp * rp) * (0.5 * delta * delta), product * product)
+    facet = facet_of(coat.eta, quarter)
+    F = divide(facet.reflected * (0.5 * delta * delta), facet.product * facet.product)
     a2 = coat.alpha * coat.alpha
     narrow = s2 / (lean2 + a2 * M2)
     V = 0.5 / (o.NoW * i.hidden + i.NoW * o.hidden)
     G = 4.0 * i.NoW * o.NoW * V
-    turn = (g - c) * (0.5 / coat.eta) * M / c
+    turn = (facet.cg / quarter - 1.0) * (0.5 / coat.eta) * M
     return FaithfulTop(F * V * (a2 / math.pi) * (narrow * narrow), (1.0 - F) * (1.0 - G * F), turn, s2)
 
 

@@ -15,8 +15,8 @@ from ..forms.curves import blurred2, curve, grazing, presence, spread_root
 from ..layers import Coat
 from ..optics.interface import rough_transmittance
 from .polynomial import Curve, Polynomial
-from .surface import Compact, Recipe, colour_of, cosines
-from .top import coat_lobe, hidden_cosine, reflectance_curve
+from .surface import Compact, Recipe, argument, at, colour_of, cosines
+from .top import coat_lobe, hidden_cosine, left_curve, reflectance_curve
 
 
 @struct
@@ -54,14 +54,16 @@ class PreciseMetal(Compact):
     """Of `grazing`: factor of the weight of the second lobe."""
     absorbing: Polynomial | None
     """Of theta: optical depth that counts."""
+    left: Polynomial | None
+    """Of the optical depth beyond that at the normal: what absorption leaves; None where no polynomial follows it."""
     unspread: Polynomial | None
     """Of theta: one over `spread_root`."""
     reflectance: Polynomial
     """Of four times the squared half cosine below."""
     widths: Vec2
     """Width of the metal's facets, and of those that stand for two meetings."""
-    least: Scalar
-    """Squared cosine below which no light is turned."""
+    least: Scalar | None
+    """Squared cosine below which no light is turned; None where the coat bends all light away from the surface."""
     condense: Scalar
     """Share of the tilt of the facets, of what the metal does not ask for, that both crossings take."""
     rise: Scalar
@@ -72,7 +74,9 @@ class PreciseMetal(Compact):
     note: str = static(default="")
 
     def way(self, NoW: Scalar) -> PreciseWay:
-        return precise_way(self.passed, self.bent, self.rest, self.again, self.coat, self.tilt, NoW)
+        hidden = hidden_cosine(NoW, self.coat.alpha * self.coat.alpha)
+        x = argument("facet", NoW, self.tilt)
+        return precise_way(self.passed, self.bent, self.rest, self.again, x, hidden, NoW)
 
     def meet(self, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> Colour:
         between = metal_between(self.widths, self.condense, self.least, i, o, lean2)
@@ -82,7 +86,7 @@ class PreciseMetal(Compact):
         rise = 1.0 + self.rise * between.share
         back = lean2 - i.sin2 - o.sin2
         root = i.rest * o.rest
-        rest = root * root * jnp.maximum(1.0 / math.pi - self.ahead * back, 0.0)
+        rest = root * root * (1.0 / math.pi - self.ahead * back)
         part = one_coat.DIRECT * between.share
         path_i = (between.inverse_i - 1.0) + part * (i.path - between.inverse_i)
         path_o = (between.inverse_o - 1.0) + part * (o.path - between.inverse_o)
@@ -92,7 +96,7 @@ class PreciseMetal(Compact):
         else:
             theta_i, theta_o = part * i.theta, part * o.theta
             depth = path_i * self.absorbing(theta_i) + path_o * self.absorbing(theta_o)
-            throughput = throughput * jnp.exp(-(2.0 * self.coat.tau + depth))
+            throughput = throughput * (jnp.exp(-(2.0 * self.coat.tau + depth)) if self.left is None else self.left(depth))
             U = (1.0 + path_i * self.unspread(theta_i)) * (1.0 + path_o * self.unspread(theta_o))
         top = coat_lobe(self.coat, i.NoW, o.NoW, i.hidden, o.hidden, lean2)
         return top + throughput * (F * U * (rise * lobes[0] + again) + rest)
@@ -114,19 +118,18 @@ class MetalBetween:
 
 @chunk
 def precise_way(
-    passed: Polynomial, bent: Polynomial, rest: Polynomial, again: Polynomial, coat: Coat, tilt: Scalar, NoW: Scalar
+    passed: Polynomial, bent: Polynomial, rest: Polynomial, again: Polynomial, x: Scalar, hidden: Scalar, NoW: Scalar
 ) -> PreciseWay:
-    """Follow one direction into the coat."""
+    """Follow one direction into the coat; x is the argument of `passed`."""
     s = grazing(NoW)
     NoW2 = NoW * NoW
     sin2 = 1.0 - NoW2
     crossing = bent(s)
     left = rest(s)
-    T = passed(jnp.sqrt(tilt + (1.0 - tilt) * NoW2)) + left[-1]
+    T = passed(x) + left[-1]
     bend = crossing[0]
     z2 = NoW2 + (1.0 - bend * bend) * sin2
     inverse = jax.lax.rsqrt(z2)
-    hidden = hidden_cosine(NoW, coat.alpha * coat.alpha)
     path = crossing[2] * inverse
     return PreciseWay(
         NoW,
@@ -145,7 +148,9 @@ def precise_way(
 
 
 @chunk
-def metal_between(widths: Vec2, condense: Scalar, least: Scalar, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> MetalBetween:
+def metal_between(
+    widths: Vec2, condense: Scalar, least: Scalar | None, i: PreciseWay, o: PreciseWay, lean2: Scalar
+) -> MetalBetween:
     """Turn two directions towards the mirror direction, each by the share of its spread in the width of the lobe."""
     bends = i.bend - o.bend
     x2 = jnp.maximum(i.bend * o.bend * lean2 + bends * (i.bend * i.sin2 - o.bend * o.sin2), 0.0)
@@ -154,8 +159,11 @@ def metal_between(widths: Vec2, condense: Scalar, least: Scalar, i: PreciseWay, 
     turns = condense * inverse
     turn_i, turn_o = turns * i.spread, turns * o.spread
     apart = o.z2 - i.z2
-    z2_i = jnp.maximum(i.z2 + turn_i * (apart + (1.0 - turn_i) * x2), least)
-    z2_o = jnp.maximum(o.z2 + turn_o * ((1.0 - turn_o) * x2 - apart), least)
+    # Neither grazes more than the other did: only what rounding takes below 0 needs a limit.
+    z2_i = i.z2 + turn_i * (apart + (1.0 - turn_i) * x2)
+    z2_o = o.z2 + turn_o * ((1.0 - turn_o) * x2 - apart)
+    if least is not None:
+        z2_i, z2_o = jnp.maximum(z2_i, least), jnp.maximum(z2_o, least)
     inverse_i, inverse_o = jax.lax.rsqrt(z2_i), jax.lax.rsqrt(z2_o)
     z_i, z_o = z2_i * inverse_i, z2_o * inverse_o
     kept = 1.0 - turn_i - turn_o
@@ -202,7 +210,8 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
 
     NoW = cosines()
     s, z, bent, left, second = (np.asarray(a) for a in jax.vmap(follow)(jnp.asarray(NoW)))
-    facet = np.sqrt(tilt + (1.0 - tilt) * NoW**2)
+    path = bent[:, 2] / z
+    facet = at("facet", NoW, tilt)
     closed = np.asarray(jax.vmap(lambda c: rough_transmittance(c, eta, interface.gain))(jnp.asarray(facet))) / eta
     theta = np.linspace(0.0, bent[:, 3].max() * one_coat.DIRECT, len(NoW))
     cosine = np.linspace(0.98 * z.min(), 1.0, len(NoW))
@@ -219,12 +228,17 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
             "absorbing": Curve(theta, np.squeeze(2.0 * np.asarray(coat.tau) / (1.0 + root)), 1.0, 5),
             "unspread": Curve(theta, 1.0 / root, 1.0, 5),
         }
-    least = jnp.asarray(min(one_coat.LEAST_Z2, z.min() ** 2))
+        tau = np.asarray(coat.tau)
+        longest = max(1.0 / z.min(), path.max()) - 1.0
+        beyond = np.linspace(0.0, 2.0 * longest * tau.max(), len(NoW))
+        if (kept := left_curve(beyond, np.add.outer(beyond, 2.0 * tau))) is not None:
+            curves["left"] = kept
+    least = None if z.min() ** 2 > 10.0 * one_coat.LEAST_Z2 else jnp.asarray(min(one_coat.LEAST_Z2, z.min() ** 2))
     there = presence(eta)
     ahead = 0.5 / math.pi * (1.0 - jnp.minimum(base.width, 1.0))
 
     def build(p: Any) -> PreciseMetal:
-        absorption = {"absorbing": None, "unspread": None}
+        absorption = {"absorbing": None, "unspread": None, "left": None}
         return PreciseMetal(
             coat=coat,
             tilt=tilt,

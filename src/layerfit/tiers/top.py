@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import chunk, divide
+from .._chunk import chunk, divide, member, struct
 from .._types import Colour, Scalar
 from ..layers import Coat
 from ..surfaces.base import Lobe
@@ -27,6 +27,28 @@ def hidden_cosine(NoW: Scalar, alpha2: Scalar) -> Scalar:
     return jnp.sqrt(alpha2 + (1.0 - alpha2) * (NoW * NoW))
 
 
+@struct
+class Facet:
+    """What `fresnel_dielectric` is made of."""
+
+    reflected: Scalar = member("twice the reflectance, over (delta / product)^2")
+    product: Scalar = member("(c + g)^2 (eta^2 c + g)^2")
+    cg: Scalar = member("product of the cosine and of that below, times eta")
+
+
+@chunk
+def facet_of(eta: Scalar, c2: Scalar) -> Facet:
+    """Of the squared cosine c2, by one root: g^2 = eta^2 - 1 + c^2, and c g is all that is asked for beside the squares."""
+    g2 = (eta - 1.0) * (eta + 1.0) + c2
+    cg = jnp.sqrt(c2 * g2)
+    eta2 = eta * eta
+    across = c2 + g2 + 2.0 * cg
+    along = (eta2 * eta2) * c2 + g2 + (2.0 * eta2) * cg
+    # 2 F = (delta / across)^2 + (delta k / along)^2
+    rp = ((eta2 + 1.0) * c2 - 1.0) * across
+    return Facet(along * along + rp * rp, across * along, cg)
+
+
 @chunk
 def coat_lobe(coat: Coat, NoL: Scalar, NoV: Scalar, hidden_l: Scalar, hidden_v: Scalar, lean2: Scalar) -> Scalar:
     """F D V of the coat's top: `fresnel_dielectric`, `ggx_d` and `v_smith`, multiplied out over one denominator."""
@@ -34,17 +56,10 @@ def coat_lobe(coat: Coat, NoL: Scalar, NoV: Scalar, hidden_l: Scalar, hidden_v: 
     M2 = M * M
     s2 = lean2 + M2
     quarter = 0.25 * s2
-    c = jnp.sqrt(quarter)
-    g = jnp.sqrt((coat.eta - 1.0) * (coat.eta + 1.0) + quarter)
-    eta2 = coat.eta * coat.eta
-    across = (c + g) * (c + g)
-    along = (eta2 * c + g) * (eta2 * c + g)
-    # 2 F = (delta / across)^2 + (delta k / along)^2
-    rp = ((eta2 + 1.0) * quarter - 1.0) * across
-    reflected = along * along + rp * rp
+    facet = facet_of(coat.eta, quarter)
     ratio = ((coat.eta - 1.0) * (coat.eta + 1.0) * 0.5 / math.sqrt(math.pi) * coat.alpha) * s2
-    ratio = divide(ratio, (lean2 + (coat.alpha * coat.alpha) * M2) * (across * along))
-    return reflected * (ratio * ratio) / (NoV * hidden_l + NoL * hidden_v)
+    ratio = divide(ratio, (lean2 + (coat.alpha * coat.alpha) * M2) * facet.product)
+    return facet.reflected * (ratio * ratio) / (NoV * hidden_l + NoL * hidden_v)
 
 
 @chunk
@@ -71,6 +86,17 @@ def reflectance_curve(lobe: Lobe, c: np.ndarray, most: int = MOST) -> Curve:
     if filmed(lobe):
         return Curve(np.asarray(half_root(4.0 * c**2)), F)
     return Curve(4.0 * c**2, F, 1.0 / F, most)
+
+
+EXPONENTIAL = 1e-5
+"""Relative error above which a polynomial does not stand for an exponential."""
+
+
+def left_curve(x: np.ndarray, depth: np.ndarray) -> Curve | None:
+    """What absorption leaves, exp(-depth) (n,) or (n, 3), of what the depth comes of; None where the exponential itself is shorter."""
+    left = np.exp(-depth)
+    curve = Curve(x, left, 1.0 / left, 6)
+    return curve if curve.possible and curve.off(curve.most) < EXPONENTIAL else None
 
 
 def half_cosines() -> np.ndarray:
