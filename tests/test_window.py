@@ -373,7 +373,7 @@ def test_the_command_opens_a_window_until_it_is_closed(screen, tmp_path):
             if window.poll() is not None or lit():
                 break
             time.sleep(0.1)
-        assert window.poll() is None
+        assert window.poll() is None, window.communicate()[1].decode()
         assert lit()
         window.send_signal(signal.SIGINT)
         assert window.wait(30.0) == 130
