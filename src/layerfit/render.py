@@ -67,7 +67,8 @@ def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any, place: Any) 
 
 
 _shaded = Compiled(shade)
-_BLOCK = 1024
+_SAMPLES = 16384
+_MOST = 8192
 _AHEAD = 16
 """Blocks that are begun before the first is waited for: what cores there are work side by side, and none waits for the next to be handed over."""
 _LIGHTS = 512
@@ -75,8 +76,9 @@ _LIGHTS = 512
 
 
 def block_size(lights: int) -> int:
-    """Pixels, of so many light samples each, that are computed at a time: as many as stay in a processor's cache."""
-    return max(32, 2 ** ((16 * _BLOCK // lights).bit_length() - 1)) if lights > 16 else _BLOCK
+    """Pixels, of so many light samples each, that are computed at a time: as many as stay in a processor's cache, and take longer than to be
+    handed over."""
+    return min(_MOST, max(32, 2 ** ((_SAMPLES // lights).bit_length() - 1)))
 
 
 def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, place: Place | None = None) -> np.ndarray:
