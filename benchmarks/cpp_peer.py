@@ -33,13 +33,13 @@ from rich.table import Table
 
 from layerfit._compiled import Compiled
 from layerfit.fit import residuals
-from layerfit.fit.blocks import Blocks
+from layerfit.fit.blocks import LARGEST, Blocks
 from layerfit.fit.parameters import parametrise
 from layerfit.fit.solve import products
 from layerfit.forms.corrected import Corrected
 from layerfit.forms.precise import Precise
 from layerfit.preset import read_preset
-from layerfit.render import block_size, predict
+from layerfit.render import predict
 from layerfit.shader.export import print_material
 from layerfit.shader.verify import FLOOR, random_pairs
 from layerfit.stack import Stack
@@ -239,7 +239,7 @@ class Ours:
         fields = [(coat, "alpha"), (coat, "eta"), (coat, depth), (base, "alpha" if hasattr(base, "alpha") else "albedo")]
         names = [f"{layer.name}.{field}" for layer, field in fields]
         self.start, self.free = parametrise(stack, names, (), "start")
-        size = block_size(1)
+        size = LARGEST
         cut = lambda a: np.stack(np.split(a, range(size, a.shape[-1], size), -1))  # noqa: E731 (pairs last)
         wi, wo = (np.moveaxis(cut(w.T), 1, -1) for w in (pairs.wi, pairs.wo))
         weight, target, inverse_sigma = (cut(a) for a in (pairs.weight, pairs.target, pairs.inverse_sigma))

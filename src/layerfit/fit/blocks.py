@@ -80,12 +80,14 @@ def stratified(samples: Samples, seed: int) -> np.ndarray:
     return np.argsort(key)
 
 
+LARGEST = 1024
+"""Pixels of a block of a fit, at most: its steps hold their derivatives beside their values."""
 LEAST = 16
 """Blocks that there is room for at least. Room for a power of two of them: a compiled step serves all images up to the same."""
 
 
 def arrange(
-    references: list[Samples], seed: int, needs: tuple[str, ...] = (), names: tuple[str, ...] = (), largest: int = 2**10
+    references: list[Samples], seed: int, needs: tuple[str, ...] = (), names: tuple[str, ...] = (), largest: int = LARGEST
 ) -> tuple[Blocks, Layout]:
     """Blocks of all references, of `largest` pixels at most, with weights of 0; `needs` is what the material has to know of the place of a pixel,
     `names` are all those of the lights, where their samples have to be known.

@@ -32,9 +32,10 @@ LEAST_COSINE = 1e-7
 """Of a direction above the surface: a unit vector in float32 does not tell on which side of 0 a smaller one is."""
 
 
-def both_above(wi: Direction, wo: Direction) -> Flag:
-    """Whether both are above the surface."""
-    return jnp.minimum(wi[-1], wo[-1]) > LEAST_COSINE
+def both_above(wi: Direction | Scalar, wo: Direction | Scalar) -> Flag:
+    """Whether both directions, or their cosines, are above the surface."""
+    NoL, NoV = (w[-1] if w.ndim else w for w in (wi, wo))
+    return jnp.minimum(NoL, NoV) > LEAST_COSINE
 
 
 @jax.jit

@@ -221,7 +221,7 @@ _RULES: dict[str, Callable[..., Bounds]] = {
     "sqrt": _increasing(np.sqrt, 0.0),
     "rsqrt": lambda eqn, a: _rounded(1.0 / np.sqrt(a.high), 1.0 / np.sqrt(np.maximum(a.low, 0.0))),
     "exp": _increasing(np.exp, by=TRANSCENDENTAL),
-    "log": _increasing(lambda x: np.log(x), 0.0, TRANSCENDENTAL),
+    "log": _increasing(np.log, 0.0, TRANSCENDENTAL),
     "power": lambda eqn, a: _increasing(lambda x: x ** eqn.params["exponent"], 0.0, TRANSCENDENTAL)(eqn, a),
     "integer_pow": _power,
     "square": _power,

@@ -78,9 +78,9 @@ class Covered:
 
     def way(self, NoW: Scalar, tilt: Scalar) -> LobeWay:
         """Follow one direction there."""
-        x = 2.0 * argument("facet", NoW, tilt) - 1.0
-        way = lobe_way(self.passed, self.refracted, self.edge, self.n, x, NoW)
-        return way if self.back is None else replace(way, R=self.back(x))
+        facet = 2.0 * argument("facet", NoW, tilt) - 1.0
+        way = lobe_way(self.passed, self.refracted, self.edge, self.n, facet, NoW)
+        return way if self.back is None else replace(way, R=self.back(facet))
 
     def meet(self, i: LobeWay, o: LobeWay, x2: Scalar, flake: "Tilted | None") -> Colour:
         """Its lobes [1/sr]; `x2` is the squared length of the sum of the directions' parts along the surface below the coats."""
@@ -121,12 +121,12 @@ def lobe_way(
     refracted: Polynomial,
     edge: Polynomial,
     n: Scalar,
-    x: Scalar,
+    facet: Scalar,
     NoW: Scalar,
 ) -> LobeWay:
-    """Follow one direction to a boundary below coats; x is the argument of `passed`."""
+    """Follow one direction to a boundary below coats; `facet` is the cosine of the mean facet as -1 to 1."""
     sin2 = 1.0 - NoW * NoW
-    energy = passed(x)
+    energy = passed(facet)
     T, width = colour_of(energy), energy[-1]
     below = refracted(NoW)
     absorbs = jnp.ndim(below) > 0

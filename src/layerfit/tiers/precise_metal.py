@@ -74,9 +74,7 @@ class PreciseMetal(Compact):
     note: str = static(default="")
 
     def way(self, NoW: Scalar) -> PreciseWay:
-        hidden = hidden_cosine(NoW, self.coat.alpha * self.coat.alpha)
-        x = argument("facet", NoW, self.tilt)
-        return precise_way(self.passed, self.bent, self.rest, self.again, x, hidden, NoW)
+        return precise_way(self.passed, self.bent, self.rest, self.again, self.coat, self.tilt, NoW)
 
     def meet(self, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> Colour:
         between = metal_between(self.widths, self.condense, self.least, i, o, lean2)
@@ -118,18 +116,19 @@ class MetalBetween:
 
 @chunk
 def precise_way(
-    passed: Polynomial, bent: Polynomial, rest: Polynomial, again: Polynomial, x: Scalar, hidden: Scalar, NoW: Scalar
+    passed: Polynomial, bent: Polynomial, rest: Polynomial, again: Polynomial, coat: Coat, tilt: Scalar, NoW: Scalar
 ) -> PreciseWay:
-    """Follow one direction into the coat; x is the argument of `passed`."""
+    """Follow one direction into the coat."""
     s = grazing(NoW)
     NoW2 = NoW * NoW
     sin2 = 1.0 - NoW2
     crossing = bent(s)
     left = rest(s)
-    T = passed(x) + left[-1]
+    T = passed(argument("facet", NoW, tilt)) + left[-1]
     bend = crossing[0]
     z2 = NoW2 + (1.0 - bend * bend) * sin2
     inverse = jax.lax.rsqrt(z2)
+    hidden = hidden_cosine(NoW, coat.alpha * coat.alpha)
     path = crossing[2] * inverse
     return PreciseWay(
         NoW,
@@ -233,7 +232,8 @@ def recipe(prepared: one_coat.Prepared, name: str) -> Recipe:
         beyond = np.linspace(0.0, 2.0 * longest * tau.max(), len(NoW))
         if (kept := left_curve(beyond, np.add.outer(beyond, 2.0 * tau))) is not None:
             curves["left"] = kept
-    least = None if z.min() ** 2 > 10.0 * one_coat.LEAST_Z2 else jnp.asarray(min(one_coat.LEAST_Z2, z.min() ** 2))
+    lowest = z.min() ** 2
+    least = None if lowest > 10.0 * one_coat.LEAST_Z2 else jnp.asarray(min(one_coat.LEAST_Z2, lowest))
     there = presence(eta)
     ahead = 0.5 / math.pi * (1.0 - jnp.minimum(base.width, 1.0))
 
