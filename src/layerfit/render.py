@@ -1,6 +1,7 @@
 """Linear radiance of a material at samples: the sum over light samples of BRDF times weight."""
 
-from collections import deque
+import os
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -67,18 +68,18 @@ def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any, place: Any) 
 
 
 _shaded = Compiled(shade)
-_SAMPLES = 16384
-_MOST = 8192
-_AHEAD = 16
-"""Blocks that are begun before the first is waited for: what cores there are work side by side, and none waits for the next to be handed over."""
+_SAMPLES = 32768
+_MOST = 16384
+_POOL = ThreadPoolExecutor(os.cpu_count(), "pixels")
+"""Blocks are computed side by side: handed over one after the other, each would wait for the last."""
 _LIGHTS = 512
 """Light samples that are summed at once: the quadratures of a fit and of its pictures then share one executable."""
 
 
-def block_size(lights: int) -> int:
+def block_size(lights: int, samples: int, most: int) -> int:
     """Pixels, of so many light samples each, that are computed at a time: as many as stay in a processor's cache, and take longer than to be
     handed over."""
-    return min(_MOST, max(32, 2 ** ((_SAMPLES // lights).bit_length() - 1)))
+    return min(most, max(32, 2 ** ((samples // lights).bit_length() - 1)))
 
 
 def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, place: Place | None = None) -> np.ndarray:
@@ -96,27 +97,23 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, pl
         lambda a: np.asarray(a, np.float32), stack
     )  # not `astype`: on its way to JAX it need not go there twice
     place = narrowed(place, stack.reads)
-    rows: list[np.ndarray] = []
-    begun: deque[list[Any]] = deque()
-
-    def finish() -> None:
-        rows.append(np.sum([np.asarray(part) for part in begun.popleft()], 0).T)
-
+    out = np.empty((len(wo), 3), np.float32)
     with jax.enable_x64(False):
         made = prepared(stack)
-        for start in range(0, len(wo), size):
-            to_light, to_eye, bright = (_padded(a[start : start + size], size) for a in (wi, wo, weight))
-            bright = np.moveaxis(bright, -1, 0)
-            there = jax.tree.map(lambda a, start=start: _padded(a[start : start + size], size), place)
-            lights = [slice(light, light + each) for light in range(0, pieces * each, each)]
-            begun.append(
-                [_shaded(made, to_light[:, some], to_eye, bright[:, :, some], there, form=stack.form) for some in lights]
-            )
-            if len(begun) > _AHEAD:
-                finish()
-        while begun:
-            finish()
-    return np.concatenate(rows)[: len(wo)]
+        shade = _shaded.ready(made, *_shapes(size, each, place), form=stack.form)
+    made = jax.tree.leaves(made)
+
+    def block(start: int) -> None:
+        to_light, to_eye, bright = (_padded(a[start : start + size], size) for a in (wi, wo, weight))
+        bright = np.ascontiguousarray(np.moveaxis(bright, -1, 0))
+        there = [_padded(a[start : start + size], size) for a in jax.tree.leaves(place)]
+        lights = [slice(light, light + each) for light in range(0, pieces * each, each)]
+        parts = [shade(*made, to_light[:, some], to_eye, bright[:, :, some], *there) for some in lights]
+        radiance = np.asarray(parts[0]) if pieces == 1 else np.sum([np.asarray(part) for part in parts], 0)
+        out[start : start + size] = radiance.T[: len(wo) - start]
+
+    list(_POOL.map(block, range(0, len(wo), size)))
+    return out
 
 
 def brdf_values(stack: Stack, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
@@ -128,18 +125,23 @@ def begin(stack: Stack, lights: int, place: Place | None = None) -> None:
     """Have what `predict` needs for pixels of so many light samples compiled, while other work goes on."""
     _, each, size = _shares(lights)
     stack = stack.astype(np.float32)
-    array = lambda *shape: jax.ShapeDtypeStruct(shape, np.float32)  # noqa: E731
-    there = jax.tree.map(lambda a: array(size, *a.shape[1:]), narrowed(place, stack.reads))
     with jax.enable_x64(False):
         made = prepared.begin(stack)
-        _shaded.begin(made, array(size, each, 3), array(size, 3), array(3, size, each), there, form=stack.form)
+        _shaded.begin(made, *_shapes(size, each, narrowed(place, stack.reads)), form=stack.form)
+
+
+def _shapes(size: int, lights: int, place: Place | None) -> tuple[Any, ...]:
+    """What a block of pixels is computed from beside the material: directions, weights, and places like these."""
+    array = lambda *shape: jax.ShapeDtypeStruct(shape, np.float32)  # noqa: E731
+    there = jax.tree.map(lambda a: array(size, *a.shape[1:]), place)
+    return array(size, lights, 3), array(size, 3), array(3, size, lights), there
 
 
 def _shares(lights: int) -> tuple[int, int, int]:
     """Equal parts of the light samples, samples in each, and pixels of a block."""
     pieces = -(-lights // _LIGHTS)
     each = -(-lights // pieces)
-    return pieces, each, block_size(each)
+    return pieces, each, block_size(each, _SAMPLES, _MOST)
 
 
 def _padded(a: np.ndarray, size: int) -> np.ndarray:

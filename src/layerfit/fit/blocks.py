@@ -80,8 +80,8 @@ def stratified(samples: Samples, seed: int) -> np.ndarray:
     return np.argsort(key)
 
 
-LARGEST = 1024
-"""Pixels of a block of a fit, at most: its steps hold their derivatives beside their values."""
+LARGEST, SAMPLES = 1024, 16384
+"""Pixels of a block of a fit, and light samples of all of them, at most: its steps hold their derivatives beside their values."""
 LEAST = 16
 """Blocks that there is room for at least. Room for a power of two of them: a compiled step serves all images up to the same."""
 
@@ -96,7 +96,7 @@ def arrange(
     """
     lights = max(s.wi.shape[1] for s in references)
     longest = max(len(s.index) for s in references)
-    size = min(block_size(lights), largest, power_of_two(longest, 32))
+    size = min(block_size(lights, SAMPLES, largest), power_of_two(longest, 32))
     rows: list[tuple[int, np.ndarray]] = []
     for k, samples in enumerate(references):
         order = stratified(samples, seed + k)
