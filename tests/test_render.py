@@ -67,6 +67,15 @@ def test_a_cache_that_cannot_be_written_stops_nothing(monkeypatch, tmp_path):
     assert _compiled.Compiled(lambda x: 2.0 * x)(np.float32(3.0)) == 6.0
 
 
+def test_what_failed_to_compile_is_tried_again(monkeypatch):
+    doubled = _compiled.Compiled(lambda x: 2.0 * x)
+    with monkeypatch.context() as wrong:
+        wrong.setitem(_compiled.OPTIONS, "no_such_option", True)
+        with pytest.raises(jax.errors.JaxRuntimeError, match="no_such"):
+            doubled(np.float32(3.0))
+    assert doubled(np.float32(3.0)) == 6.0
+
+
 def test_classes_with_fields_alike_are_of_different_structure():
     """Structures are what compiled functions are kept by: a Blinn may not be drawn by what was compiled for a Phong."""
     bases = [cls() for cls in BASES.values()]

@@ -107,7 +107,10 @@ class Compiled:
 
     def _entry(self, leaves: list[Any], structure: Any, static: dict[str, Any]) -> tuple[Future[Any], Any]:
         key = (structure, tuple([(a.shape, a.dtype) for a in leaves]), tuple(static.values()))
-        if key not in self._executables:
+        known = self._executables.get(key)
+        if known is None or (
+            known[0].done() and known[0].exception()
+        ):  # what failed, as for want of memory, may be tried again
             start = time.perf_counter()
             traced = self._traced(leaves, structure, static).trace(*leaves)
             lowered = traced.lower()
