@@ -239,8 +239,7 @@ class Ours:
         fields = [(coat, "alpha"), (coat, "eta"), (coat, depth), (base, "alpha" if hasattr(base, "alpha") else "albedo")]
         names = [f"{layer.name}.{field}" for layer, field in fields]
         self.start, self.free = parametrise(stack, names, (), "start")
-        size = LARGEST
-        cut = lambda a: np.stack(np.split(a, range(size, a.shape[-1], size), -1))  # noqa: E731 (pairs last)
+        cut = lambda a: np.stack(np.split(a, range(LARGEST, a.shape[-1], LARGEST), -1))  # noqa: E731 (pairs last)
         wi, wo = (np.moveaxis(cut(w.T), 1, -1) for w in (pairs.wi, pairs.wo))
         weight, target, inverse_sigma = (cut(a) for a in (pairs.weight, pairs.target, pairs.inverse_sigma))
         blocks = Blocks(wi[:, :, None], wo, weight[..., None], target, inverse_sigma, np.zeros(len(wi), np.int32))

@@ -3,8 +3,9 @@
 import contextlib
 import dataclasses
 import hashlib
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from importlib.metadata import version
@@ -43,6 +44,7 @@ OPTIONS: Any = {"xla_backend_optimization_level": 3, "xla_disable_hlo_passes": "
 which LLVM no longer vectorises (two to four times slower). The newer emitters take up to twice as long to compile these."""
 
 _POOL = ThreadPoolExecutor(2, "compile")
+_CORES = ThreadPoolExecutor(os.cpu_count(), "compute")
 
 KEPT: list[Path] = []
 """The folder where traced functions are kept from run to run; empty for none. Tracing them anew was half of a second run's time."""
@@ -70,6 +72,12 @@ def _kept(path: Path) -> export.Exported | None:
     if hashlib.sha256(stored[32:]).digest() != stored[:32]:
         return None
     return export.deserialize(bytearray(stored[32:]))
+
+
+def side_by_side(compute: Callable[[int], Any], parts: Iterable[int]) -> list[Any]:
+    """What a function that calls executables gives for each part, computed on all cores: begun one after the other by one thread, each
+    waits for the last. What it calls is compiled before, or every thread would wait for it."""
+    return list(_CORES.map(compute, parts))
 
 
 class Compiled:
@@ -107,16 +115,16 @@ class Compiled:
 
     def _entry(self, leaves: list[Any], structure: Any, static: dict[str, Any]) -> tuple[Future[Any], Any]:
         key = (structure, tuple([(a.shape, a.dtype) for a in leaves]), tuple(static.values()))
-        known = self._executables.get(key)
-        if known is None or (
-            known[0].done() and known[0].exception()
-        ):  # what failed, as for want of memory, may be tried again
+        entry = self._executables.get(key)
+        # What failed to compile, as for want of memory, is tried again.
+        if entry is None or (entry[0].done() and entry[0].exception()):
             start = time.perf_counter()
             traced = self._traced(leaves, structure, static).trace(*leaves)
             lowered = traced.lower()
             CLOCK.trace_s += time.perf_counter() - start
-            self._executables[key] = _POOL.submit(lowered.compile, compiler_options=OPTIONS | self._options), traced.out_info
-        return self._executables[key]
+            entry = _POOL.submit(lowered.compile, compiler_options=OPTIONS | self._options), traced.out_info
+            self._executables[key] = entry
+        return entry
 
     def _traced(self, leaves: list[Any], structure: Any, static: dict[str, Any]) -> Any:
         """The function of the leaves of its arguments: as it was kept by an earlier run, or traced and kept."""

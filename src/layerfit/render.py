@@ -1,8 +1,6 @@
 """Linear radiance of a material at samples: the sum over light samples of BRDF times weight."""
 
-import os
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import jax
@@ -11,7 +9,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from ._compiled import Compiled
+from ._compiled import Compiled, side_by_side
 from ._place import Place, narrowed
 from .stack import Stack, at, evaluate, prepared
 
@@ -68,10 +66,8 @@ def _pixel(form: Any, prepared: Any, wi: Any, wo: Any, weight: Any, place: Any) 
 
 
 _shaded = Compiled(shade)
-_SAMPLES = 32768
-_MOST = 16384
-_POOL = ThreadPoolExecutor(os.cpu_count(), "pixels")
-"""Blocks are computed side by side: handed over one after the other, each would wait for the last."""
+_SAMPLES, _MOST = 32768, 16384
+"""Light samples and pixels of a block, at most."""
 _LIGHTS = 512
 """Light samples that are summed at once: the quadratures of a fit and of its pictures then share one executable."""
 
@@ -100,7 +96,7 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, pl
     out = np.empty((len(wo), 3), np.float32)
     with jax.enable_x64(False):
         made = prepared(stack)
-        shade = _shaded.ready(made, *_shapes(size, each, place), form=stack.form)
+        shaded = _shaded.ready(made, *_shapes(size, each, place), form=stack.form)
     made = jax.tree.leaves(made)
 
     def block(start: int) -> None:
@@ -108,11 +104,10 @@ def predict(stack: Stack, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, pl
         bright = np.ascontiguousarray(np.moveaxis(bright, -1, 0))
         there = [_padded(a[start : start + size], size) for a in jax.tree.leaves(place)]
         lights = [slice(light, light + each) for light in range(0, pieces * each, each)]
-        parts = [shade(*made, to_light[:, some], to_eye, bright[:, :, some], *there) for some in lights]
-        radiance = np.asarray(parts[0]) if pieces == 1 else np.sum([np.asarray(part) for part in parts], 0)
-        out[start : start + size] = radiance.T[: len(wo) - start]
+        parts = [shaded(*made, to_light[:, some], to_eye, bright[:, :, some], *there) for some in lights]
+        out[start : start + size] = reduce(np.add, map(np.asarray, parts)).T[: len(wo) - start]
 
-    list(_POOL.map(block, range(0, len(wo), size)))
+    side_by_side(block, range(0, len(wo), size))
     return out
 
 

@@ -185,7 +185,7 @@ def recipe(prepared: corrected.Prepared, name: str) -> Recipe:
     def build(fitted: Any) -> CorrectedStack:
         def there(key: str) -> Covered:
             found = {name.removeprefix(f"{key}."): curve for name, curve in fitted.items() if name.startswith(f"{key}.")}
-            return Covered(**({"back": None, "left": None} | found), **fixed[key])
+            return Covered(**(fixed[key] | found))
 
         parts = {key: there(key) for key in fixed}
         return CorrectedStack(

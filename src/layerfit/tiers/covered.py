@@ -209,4 +209,5 @@ def curves_of(
         curves["back"] = Curve(curves["passed"].x, met["R"])
     n = float(np.prod([float(coat.eta) for coat in coats[:depth]]))
     rest = {"own2": own2, "n": jnp.asarray(n), "tau": above.extinction, "distribution": lobe.distribution, "film": filmed(lobe)}
+    rest |= {"back": None, "left": None}  # where they have no curve
     return curves, rest

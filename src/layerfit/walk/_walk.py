@@ -1,8 +1,6 @@
 """The walk of many particles: lanes, threads and sums."""
 
-import os
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._compiled import Compiled, fusion_emitters
+from .._compiled import Compiled, fusion_emitters, side_by_side
 from ..layers import Coat
 from ..stack import Stack
 from ._material import Haze, Interface, Material, read
@@ -86,9 +84,8 @@ def walk_rows(
     def group(first: int) -> Any:
         return jax.tree.map(np.asarray, _run(*arguments(first)))
 
-    _run.ready(*arguments(0))  # once: threads would have it compiled, and wait, each
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        tallies = list(pool.map(group, range(0, filled, LANES)))
+    _run.ready(*arguments(0))
+    tallies = side_by_side(group, range(0, filled, LANES))
     tally = jax.tree.map(lambda *x: np.concatenate(x)[: rows * lanes_per_row].reshape(rows, -1).sum(1, dtype=float), *tallies)
     count = per_lane * lanes_per_row
     mean, square = (np.broadcast_to(np.stack(x, -1) / count, (rows, 3)) for x in (tally.sum, tally.square))
