@@ -142,15 +142,18 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
         lands = (room < self.landing * (upper - lower)) & (jnp.abs(gradient) >= jnp.diagonal(gram) * room)
         edge = jnp.where(gradient > 0.0, lower, upper)
         step = lambda trust: self._descend(gradient, gram, held, room, trust)  # noqa: E731
-        move = lambda trust: jnp.where(lands, edge, jnp.clip(y + step(trust), lower, upper)) - y  # noqa: E731
+        kept_in = lambda step: jnp.where(lands, edge, jnp.clip(y + step, lower, upper)) - y  # noqa: E731
         promise = lambda move: -(gradient @ move + 0.5 * move @ gram @ move)  # noqa: E731
-        done = done | (promise(step(step_size)) <= self.gain * loss) | ~jnp.isfinite(loss)
+        first = step(step_size)
+        done = done | (promise(first) <= self.gain * loss) | ~jnp.isfinite(loss)
         # Cut off at the bounds, a step can lead uphill. A shorter one is nearer to the gradient, and in the end does not.
-        step_size = lax.while_loop(
-            lambda trust: (promise(move(trust)) <= 0.0) & (trust > self.least) & ~done, lambda trust: 0.25 * trust, step_size
+        step_size, move = lax.while_loop(
+            lambda at: (promise(at[1]) <= 0.0) & (at[0] > self.least) & ~done,
+            lambda at: (0.25 * at[0], kept_in(step(0.25 * at[0]))),
+            (step_size, kept_in(first)),
         )
         done = done | (step_size <= self.least)
-        y_eval = y + move(step_size)
+        y_eval = y + move
         search = eqx.tree_at(lambda s: s.step_size, search, step_size)
         state = _State(jnp.array(False), y_eval, loss, gradient, gram, search, step_size, done, result)
         return y, state, (gradient, gram)

@@ -27,7 +27,7 @@ from .curves import (
     blurred,
     diffuse_return,
     hemispherical,
-    interpolated,
+    passed,
     polynomial,
     presence,
 )
@@ -79,19 +79,20 @@ def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, t
     cells = cells_of(edge)
     aside = 0.5 * nodes.spread / nodes.z
     first, wide = (blurred(width, aside) for width in (base.alpha, wider(base.alpha, alpha)))
-    bare = jnp.broadcast_to(base.alpha, cells.shape)
+    bare, bare_first = (jnp.broadcast_to(base.alpha, z.shape) for z in (cells, first))
     top = jnp.broadcast_to(jnp.maximum(alpha * presence(eta), 1e-3), cells.shape)
 
     # All at once, for the compiler's sake: light between base and top; light from above; that light in one wider lobe; the top from below.
     begins = jnp.concatenate([cells, nodes.z, nodes.z, cells])
-    c, z, weight = jax.vmap(_facets)(begins, jnp.concatenate([bare, first, wide, top]))
+    c, z, weight = _facets(begins, jnp.concatenate([bare, first, wide, top]))
     into = _into(z, edge)
     up, down = slice(0, -len(cells)), slice(-len(cells), None)
 
     # In sight as facets of the base are, which loses nothing but light that is sent into others; the lobe as it is evaluated.
-    sight = _lambda(begins[up, None], jnp.concatenate([bare, jnp.broadcast_to(base.alpha, first.shape), wide])[:, None])
-    shadow = _lambda(begins[up, None], base.alpha) + _lambda(z[up], base.alpha)
-    energy = weight[up] * jax.vmap(jax.vmap(base.reflectance))(c[up]) * ((1.0 + sight) / (1.0 + shadow))
+    met = jnp.concatenate([bare, bare_first, bare_first, top])
+    weight = weight / _hidden(begins, z, met)
+    sight = 1.0 + _lambda(begins[up], jnp.concatenate([bare, bare_first, wide]))
+    energy = weight[up] * sight[:, None] * _reflected(base, c[up])
     back = into[up] @ nodes.R
     once = 1.0 if tau is None else jnp.exp(-safe_divide(tau, z[up]))
     out = energy * once * (into[up] @ _exits(nodes, cells, eta))
@@ -99,8 +100,7 @@ def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, t
     returns = energy * once * once * back
     inside = returns * safe_sqrt(jnp.minimum((1.0 - back) / (1.0 - nodes.R[-1]), 1.0))
 
-    masked = _lambda(begins[down, None], top[:, None]) + _lambda(z[down], top[:, None])
-    share = weight[down] * jax.vmap(jax.vmap(lambda c: fresnel_dielectric(c, 1.0 / eta)))(c[down]) / (1.0 + masked)
+    share = weight[down] * jax.vmap(jax.vmap(lambda c: fresnel_dielectric(c, 1.0 / eta)))(c[down])
     share = share / jnp.maximum(jnp.sum(share, -1, keepdims=True), 1e-12)
     turn = jnp.einsum("ns,nsk->nk", share, into[down])
 
@@ -136,9 +136,11 @@ def _factors(
     `leaves` is the energy of the lobe that leaves from cosines z below.
     """
     share = leaves / jnp.maximum(jnp.sum(leaves, -1, keepdims=True), 1e-9)
+    whole, beyond = jnp.sum(share, -1), jnp.einsum("ms,msk->mk", share, passed(z, nodes.z))
     factor = safe_sqrt(weight)
     for _ in range(3):
-        factor = safe_sqrt(weight * safe_divide(factor, jnp.sum(share * interpolated(z, nodes.z, factor), -1)))
+        mean = whole * factor[0] + beyond @ jnp.diff(factor)  # over all views, with straight lines between the nodes
+        factor = safe_sqrt(weight * safe_divide(factor, mean))
     return factor
 
 
@@ -150,21 +152,34 @@ def cells_of(edge: Scalar) -> Float[Array, " k"]:
     return jnp.maximum(outside * edge + inside * (1.0 - edge), 1e-3)
 
 
+@jax.jit
 def _into(z: Float[Array, "n s"], edge: Scalar) -> Float[Array, "n s k"]:
     """How light at cosines z is shared among the two cells next to it: linear weights, on a last axis."""
     place = where(z < edge, safe_divide(z, edge), 1.0 + (z - edge) / (1.0 - edge))
     return jnp.maximum(1.0 - jnp.abs(CELLS * place[..., None] - jnp.asarray(np.arange(2 * CELLS + 1), z.dtype)), 0.0)
 
 
+@jax.custom_jvp
 def _sum_of_powers(M: Float[Array, "k k"], x: Float[Array, " k"]) -> Float[Array, " k"]:
-    """x + M x + M^2 x + ... of 32 terms: light has left or is absorbed long before."""
-    for _ in range(5):
+    """x + M x + M^2 x + ... of 64 terms: light has left or is absorbed long before."""
+    for _ in range(6):
         x = x + M @ x
         M = M @ M
     return x
 
 
-def _facets(z: Scalar, alpha: Scalar) -> tuple[Float[Array, " s"], Float[Array, " s"], Float[Array, " s"]]:
+@_sum_of_powers.defjvp
+def _(primals: Any, tangents: Any) -> Any:
+    (M, _), (dM, dx) = primals, tangents
+    total = _sum_of_powers(*primals)
+    # y = x + M y, derived: the powers of M are those of the sum itself.
+    return total, _sum_of_powers(M, dx + dM @ total)
+
+
+@jax.jit
+def _facets(
+    z: Float[Array, " n"], alpha: Float[Array, " n"]
+) -> tuple[Float[Array, "n s"], Float[Array, "n s"], Float[Array, "n s"]]:
     """Facets in sight of a direction: cosine to it, cosine of the reflected light, and weight.
 
     Visible GGX normals by spherical caps (Dupuy and Benyoub 2023), at the nodes of a quadrature; light sent down weighs nothing.
@@ -173,18 +188,32 @@ def _facets(z: Scalar, alpha: Scalar) -> tuple[Float[Array, " s"], Float[Array, 
     phi = (np.arange(SPOKES) + 0.5) * np.pi / SPOKES
     ring = jnp.asarray(np.repeat(0.5 * (u + 1.0), SPOKES), z.dtype)
     weight = jnp.asarray(np.repeat(0.5 * du / SPOKES, SPOKES), z.dtype)
-    cos_phi, sin_phi = (jnp.asarray(np.tile(f(phi), RINGS), z.dtype) for f in (np.cos, np.sin))
-    s = safe_sqrt((1.0 - z) * (1.0 + z))
-    stretched = 1.0 / jnp.sqrt(alpha * alpha * s * s + z * z)
-    wx, wz = alpha * s * stretched, z * stretched
+    cos_phi = jnp.asarray(np.tile(np.cos(phi), RINGS), z.dtype)
+    z, alpha = z[:, None], alpha[:, None]
+    s2, alpha2 = (1.0 - z) * (1.0 + z), alpha * alpha
+    # Facets that are `alpha` times as wide as those of a sphere: the direction to it is a unit vector there, and so is that to its cap.
+    stretched = 1.0 / jnp.sqrt(alpha2 * s2 + z * z)
+    wx, wz = alpha * safe_sqrt(s2) * stretched, z * stretched
     cap = (1.0 - ring) * (1.0 + wz) - wz
-    radius = safe_sqrt((1.0 - cap) * (1.0 + cap))
-    hx, hy, hz = alpha * (radius * cos_phi + wx), alpha * radius * sin_phi, cap + wz
-    length = jnp.sqrt(hx * hx + hy * hy + hz * hz)
-    c = (hx * s + hz * z) / length
-    out = 2.0 * c * hz / length - z
+    met = 1.0 + cap * wz + safe_sqrt((1.0 - cap) * (1.0 + cap)) * cos_phi * wx  # of their sum with the direction
+    hz = cap + wz
+    length2 = 2.0 * alpha2 * met + (1.0 - alpha2) * hz * hz
+    across = met / stretched
+    c = across / jnp.sqrt(length2)
+    out = 2.0 * across * hz / length2 - z
     above = out > 1e-3
     return c, where(above, out, 1.0), where(above, weight, 0.0)
+
+
+@jax.jit
+def _hidden(z: Float[Array, " n"], out: Float[Array, "n s"], alpha: Float[Array, " n"]) -> Float[Array, "n s"]:
+    """1 + Lambda of a direction + Lambda of where its light goes."""
+    return 1.0 + _lambda(z, alpha)[:, None] + _lambda(out, alpha[:, None])
+
+
+@jax.jit
+def _reflected(base: Conductor | Coat, c: Float[Array, "n s"]) -> Float[Array, "n s"]:
+    return jax.vmap(jax.vmap(base.reflectance))(c)
 
 
 def _lambda(z: Any, alpha: Any) -> Any:

@@ -198,9 +198,13 @@ def gauss(edge: Scalar) -> tuple[Float[Array, " q"], Float[Array, " q"]]:
 
 def interpolated(x: Float[Array, "*n"], known: Float[Array, " k"], values: Float[Array, " k"]) -> Float[Array, "*n"]:
     """Straight lines between values at growing arguments, and level beyond them."""
+    return values[0] + passed(x, known) @ jnp.diff(values)
+
+
+def passed(x: Float[Array, "*n"], known: Float[Array, " k"]) -> Float[Array, "*n k-1"]:
+    """Part of each interval between growing arguments that lies before x."""
     # Not `jnp.interp`, which looks places up: a page computes this too, and has no step for that.
-    passed = clip(safe_divide(x[..., None] - known[:-1], jnp.diff(known)), 0.0, 1.0)
-    return values[0] + passed @ jnp.diff(values)
+    return clip(safe_divide(x[..., None] - known[:-1], jnp.diff(known)), 0.0, 1.0)
 
 
 def hemispherical(values: Float[Array, " m"]) -> Scalar:
