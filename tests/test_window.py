@@ -213,8 +213,9 @@ def screen() -> Iterator[str]:
     read, write = os.pipe()
     # Not number 0, on which a program finds OpenGL whatever DISPLAY says: others are tried without a driver meanwhile.
     number = f":{100 + os.getpid() % 900}"
+    # Nor does it begin anew when the last that looked at it is gone: who comes meanwhile is turned away.
     server = subprocess.Popen(
-        ["Xvfb", number, "-displayfd", str(write), "-screen", "0", "1200x800x24", "-nolisten", "tcp"],
+        ["Xvfb", number, "-displayfd", str(write), "-screen", "0", "1200x800x24", "-nolisten", "tcp", "-noreset"],
         pass_fds=[write],
         stderr=subprocess.DEVNULL,
     )
