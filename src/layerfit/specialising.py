@@ -121,7 +121,8 @@ def _reduced(
     now, held = whole, frozenset[str]()
     rows: list[dict[str, Any]] = []
     tried: set[str] = set()
-    while candidates := [(r, n) for r, n in _shorter(now) if r.what not in tried]:
+    shorter = _shorter(now)
+    while candidates := [(r, n) for r, n in shorter if r.what not in tried]:
         removal, length = min(candidates, key=lambda pair: pair[1])
         tried.add(removal.what)
         progress(removal.what, 0.9 * len(tried) / (len(tried) + len(candidates)))
@@ -141,6 +142,7 @@ def _reduced(
         )
         if goes:
             now, held = _Tried(fitted, error, _length(fitted)), without
+            shorter = _shorter(now)
     return now, rows
 
 
