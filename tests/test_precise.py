@@ -10,7 +10,7 @@ import pytest
 
 from helpers import COPPER, brdf_rows, direction, hemisphere, varnish, with_slope
 from layerfit.errors import InputError
-from layerfit.forms import corrected, curves, one_coat, precise, tables
+from layerfit.forms import bounces, corrected, curves, one_coat, precise, tables
 from layerfit.forms.one_coat import Crossing, Prepared
 from layerfit.forms.precise import Precise, refuses
 from layerfit.layers import Coat
@@ -234,6 +234,45 @@ def test_the_baked_curves_are_the_tables(interface):
     assert max(worst["T"]) < 3e-3
     assert np.median(worst["path"]) < 2e-3
     assert np.median(worst["spread"]) < 0.01
+
+
+def test_sums_of_powers_have_their_derivatives():
+    """They are solutions of y = x + M y."""
+    draw = np.random.default_rng(0).random
+    M, x, dM, dx = 0.13 * draw((6, 6)), draw(6), draw((6, 6)), draw(6)
+    assert np.max(np.abs(np.linalg.eigvals(M))) > 0.3
+    total, slope = jax.jvp(bounces.sum_of_powers, (M, x), (dM, dx))
+    inverse = np.linalg.inv(np.eye(6) - M)
+    np.testing.assert_allclose(total, inverse @ x, rtol=1e-12)
+    np.testing.assert_allclose(slope, inverse @ (dx + dM @ inverse @ x), rtol=1e-12)
+
+
+@pytest.mark.parametrize("alpha", [0.02, 0.3, 1.0])
+def test_facets_in_sight_mirror_a_direction(alpha):
+    """Cosines of facets and of what they reflect are those of vectors: a direction on a stretched sphere, a point of its cap, and their sum."""
+    u, _ = np.polynomial.legendre.leggauss(bounces.RINGS)
+    ring, phi = (
+        np.repeat(0.5 * (u + 1.0), bounces.SPOKES),
+        np.tile((np.arange(bounces.SPOKES) + 0.5) * np.pi / bounces.SPOKES, len(u)),
+    )
+    stretch = np.array([alpha, alpha, 1.0])
+    z = np.array([0.1, 0.5, 0.95])
+    cosines, mirrored, weight = bounces.facets(z, np.full(3, alpha))
+    for w, c, out, seen in zip(in_a_plane(z), cosines, mirrored, weight, strict=True):
+        there = w * stretch / np.linalg.norm(w * stretch)
+        cap = (1.0 - ring) * (1.0 + there[2]) - there[2]
+        radius = np.sqrt(1.0 - cap * cap)
+        h = (np.stack([radius * np.cos(phi), radius * np.sin(phi), cap], -1) + there) * stretch
+        h /= np.linalg.norm(h, axis=-1, keepdims=True)
+        np.testing.assert_allclose(c, h @ w, rtol=1e-12)
+        reflected = 2.0 * (h @ w) * h[:, 2] - w[2]
+        np.testing.assert_allclose(out, np.where(reflected > 1e-3, reflected, 1.0), rtol=1e-9)
+        assert np.array_equal(seen > 0.0, reflected > 1e-3)
+
+
+def in_a_plane(z):
+    """Directions of these cosines, in one plane."""
+    return np.stack([np.sqrt(1.0 - z * z), 0.0 * z, z], -1)
 
 
 def test_interpolation_is_smooth_and_exact_for_parabolas():

@@ -84,7 +84,7 @@ def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, t
 
     # All at once, for the compiler's sake: light between base and top; light from above; that light in one wider lobe; the top from below.
     begins = jnp.concatenate([cells, nodes.z, nodes.z, cells])
-    c, z, weight = _facets(begins, jnp.concatenate([bare, first, wide, top]))
+    c, z, weight = facets(begins, jnp.concatenate([bare, first, wide, top]))
     into = _into(z, edge)
     up, down = slice(0, -len(cells)), slice(-len(cells), None)
 
@@ -106,7 +106,7 @@ def _bounces(nodes: Nodes, alpha: Scalar, eta: Scalar, base: Conductor | Coat, t
 
     n, m = len(cells), len(cells) + len(nodes.z)
     chain = jnp.einsum("ns,nsk->nk", returns[:m], into[:m]) @ turn
-    total = _sum_of_powers(chain[:n], leaves[:n])
+    total = sum_of_powers(chain[:n], leaves[:n])
     lobe = jnp.einsum("ns,nsk->nk", inside[n:m], into[n:m]) @ (turn @ leaves[:n])
     rest = jnp.maximum(chain[n:] @ total - lobe, 0.0)
     kept = 1.0 if tau is None else jax.vmap(lambda path, theta: absorbed(path, theta, tau))(nodes.path, nodes.theta)
@@ -160,7 +160,7 @@ def _into(z: Float[Array, "n s"], edge: Scalar) -> Float[Array, "n s k"]:
 
 
 @jax.custom_jvp
-def _sum_of_powers(M: Float[Array, "k k"], x: Float[Array, " k"]) -> Float[Array, " k"]:
+def sum_of_powers(M: Float[Array, "k k"], x: Float[Array, " k"]) -> Float[Array, " k"]:
     """x + M x + M^2 x + ... of 64 terms: light has left or is absorbed long before."""
     for _ in range(6):
         x = x + M @ x
@@ -168,16 +168,16 @@ def _sum_of_powers(M: Float[Array, "k k"], x: Float[Array, " k"]) -> Float[Array
     return x
 
 
-@_sum_of_powers.defjvp
+@sum_of_powers.defjvp
 def _(primals: Any, tangents: Any) -> Any:
     (M, _), (dM, dx) = primals, tangents
-    total = _sum_of_powers(*primals)
+    total = sum_of_powers(*primals)
     # y = x + M y, derived: the powers of M are those of the sum itself.
-    return total, _sum_of_powers(M, dx + dM @ total)
+    return total, sum_of_powers(M, dx + dM @ total)
 
 
 @jax.jit
-def _facets(
+def facets(
     z: Float[Array, " n"], alpha: Float[Array, " n"]
 ) -> tuple[Float[Array, "n s"], Float[Array, "n s"], Float[Array, "n s"]]:
     """Facets in sight of a direction: cosine to it, cosine of the reflected light, and weight.
