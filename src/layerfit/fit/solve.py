@@ -142,8 +142,8 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
         lands = (room < self.landing * (upper - lower)) & (jnp.abs(gradient) >= jnp.diagonal(gram) * room)
         edge = jnp.where(gradient > 0.0, lower, upper)
         step = lambda trust: self._descend(gradient, gram, held, room, trust)  # noqa: E731
-        kept_in = lambda step: jnp.where(lands, edge, jnp.clip(y + step, lower, upper)) - y  # noqa: E731
-        promise = lambda move: -(gradient @ move + 0.5 * move @ gram @ move)  # noqa: E731
+        kept_in = lambda by: jnp.where(lands, edge, jnp.clip(y + by, lower, upper)) - y  # noqa: E731
+        promise = lambda by: -(gradient @ by + 0.5 * by @ gram @ by)  # noqa: E731
         first = step(step_size)
         done = done | (promise(first) <= self.gain * loss) | ~jnp.isfinite(loss)
         # Cut off at the bounds, a step can lead uphill. A shorter one is nearer to the gradient, and in the end does not.
