@@ -3,6 +3,7 @@
 import re
 import shlex
 import shutil
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -25,9 +26,12 @@ PAGES = [
 
 
 def kind(example: str) -> tuple[str, ...]:
-    """The command, the kind of file that it takes, and its options: of those that differ in names and numbers alone one is run."""
+    """The command, the kind of file that it takes, and its options: of those that differ in names and numbers alone one is run.
+
+    A preset by its file is one by its name: each is in many examples.
+    """
     _, command, *words = shlex.split(example)
-    endings = [word.rpartition(".")[2] for word in words[:2] if "." in word]
+    endings = [word.rpartition(".")[2] for word in words[:2] if "." in word and not word.endswith(".json")]
     return command, *endings, *sorted(word for word in words if word.startswith("-"))
 
 
@@ -98,6 +102,7 @@ def test_an_example_runs(example, workplace, gl, tmp_path, monkeypatch):
     monkeypatch.setattr("layerfit.demo.references", lambda: folder / "captures")
     monkeypatch.setattr("layerfit.shader.cost.LEAST_MS", 0.1)
     monkeypatch.setattr("layerfit.shader.cost.SIDE", 64)
+    monkeypatch.setattr(import_module("layerfit.study.variants"), "COMPACT_ERRORS", (1e-2,))
     monkeypatch.setattr("layerfit.view.serve", lambda text, ready, open_browser: ready("http://127.0.0.1/"))
     words = shlex.split(example)[1:]
     ran = layerfit(*words, *(less for word in words for less in LESS.get(word, ())))
