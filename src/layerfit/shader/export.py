@@ -10,11 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import __version__
-from .._chunk import CHUNKS, where
+from .._chunk import CHUNKS
 from .._fields import params
 from .._place import TANGENT, Place
 from ..forms import weathering
-from ..optics.directions import above, both_above
 from ..optics.lazanyi import fit_lazanyi
 from ..preset import left_out, model_name
 from ..stack import Stack, at, evaluate
@@ -184,8 +183,7 @@ def _shade(shader: Shader, prepared: Any, wi: Any, wo: Any, *place: Any) -> Any:
     """BRDF (3,) of a prepared material and of what `_inputs` says."""
     if COSINES in shader.asks:
         (lean2,) = place
-        lit = both_above(wi, wo)
-        return jnp.broadcast_to(where(lit, prepared.shade(above(lit, wi), above(lit, wo), lean2), 0.0), (3,))
+        return jnp.broadcast_to(prepared.shade(wi, wo, lean2), (3,))
     there = Place(**dict(zip(shader.stack.reads, place, strict=True))) if place else None
     return jnp.broadcast_to(evaluate(shader.stack.form, at(prepared, there), wi, wo), (3,))
 

@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
-from .._chunk import static, struct
-from .._types import Colour, Scalar
+from .._chunk import static, struct, where
+from .._types import Colour, Flag, Scalar
 from ..surfaces import Conductor
 from .polynomial import Polynomial
 from .surface import Compact, Recipe, half_root
@@ -26,14 +26,15 @@ class BareMetal(Compact):
     def way(self, NoW: Scalar) -> Any:
         return NoW, hidden_cosine(NoW, self.alpha2)
 
-    def meet(self, i: Any, o: Any, lean2: Scalar) -> Colour:
+    def meet(self, i: Any, o: Any, lean2: Scalar, lit: Flag) -> Colour:
         (NoL, hidden_l), (NoV, hidden_v) = i, o
         M = NoL + NoV
         M2 = M * M
         s2 = lean2 + M2
         F = self.reflectance(half_root(s2) if self.film else s2)
         narrow = s2 / (lean2 + self.alpha2 * M2)
-        return F * (self.alpha2 * (0.5 / math.pi) * (narrow * narrow) / (NoV * hidden_l + NoL * hidden_v))
+        f = F * (self.alpha2 * (0.5 / math.pi) * (narrow * narrow) / (NoV * hidden_l + NoL * hidden_v))
+        return where(lit, f, 0.0)
 
 
 def recipe(base: Conductor, name: str) -> Recipe:

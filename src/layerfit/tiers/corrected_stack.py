@@ -12,9 +12,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import dot, static, struct
+from .._chunk import dot, static, struct, where
 from .._place import Place
-from .._types import Colour, Scalar, Vec2, Vec3
+from .._types import Colour, Flag, Scalar, Vec2, Vec3
 from ..forms import corrected
 from ..layers import Coat
 from ..optics.flakes import flake_tilt, kept_tilt, lost_variance
@@ -72,8 +72,8 @@ class CorrectedStack(Compact):
         assert there is not None
         return NoW, hidden, lobes, there.T * left
 
-    def meet(self, i: Any, o: Any, lean2: Scalar) -> Colour:
-        return self.met(i, o, lean2, None)
+    def meet(self, i: Any, o: Any, lean2: Scalar, lit: Flag) -> Colour:
+        return where(lit, self.met(i, o, lean2, None), 0.0)
 
     def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
         if self.flakes is None:

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._chunk import chunk, member, safe_sqrt, static, struct, where
-from .._types import Colour, Scalar
+from .._types import Colour, Flag, Scalar
 from ..forms import one_coat
 from ..forms.crossing import cross
 from ..forms.curves import curve, grazing
@@ -19,8 +19,8 @@ from ..layers import Coat
 from ..optics.interface import with_second_facet
 from ..surfaces.diffuse import Lambert, OrenNayar
 from .polynomial import Curve, Polynomial
-from .surface import Argument, Compact, Recipe, argument, at, best_argument, colour_of, cosines
-from .top import coat_lobe, filmed_lobe, half_cosines, hidden_cosine, reflectance_curve, without_film
+from .surface import Argument, Compact, Recipe, argument, at, best_argument, colour_of, cosines, half_root
+from .top import coat_lobe, coat_shape, half_cosines, hidden_cosine, reflectance_curve, without_film
 
 
 @struct
@@ -29,7 +29,8 @@ class DiffuseWay:
 
     NoW: Scalar = member("cosine above")
     hidden: Scalar = member("NoW (1 + 2 Lambda) of the coat's facets")
-    left: Colour = member("square root of the share of the light that leaves, one way")
+    passed: Scalar = member("energy that passes the coat's top")
+    left: Colour = member("what is left of it of the square root of the share of the light that leaves, one way")
 
 
 @struct
@@ -38,7 +39,8 @@ class GroovedWay:
 
     NoW: Scalar = member("cosine above")
     hidden: Scalar = member("NoW (1 + 2 Lambda) of the coat's facets")
-    left: Colour = member("square root of the share of the light that leaves, one way")
+    passed: Scalar = member("energy that passes the coat's top")
+    left: Colour = member("what is left of it of the square root of the share of the light that leaves, one way")
     sin2: Scalar = member("squared sine above")
     sine: Scalar = member("sine above")
     bend: Scalar = member("sine below over that above")
@@ -76,29 +78,31 @@ class DiffuseUnderCoat(Compact):
             T, left = T + left[-1], colour_of(left)
         hidden = hidden_cosine(NoW, self.coat.alpha * self.coat.alpha)
         if self.bent is None:
-            return DiffuseWay(NoW, hidden, T * left)
-        return grooved_way(self.bent(x), NoW, hidden, T * left)
+            return DiffuseWay(NoW, hidden, T, left)
+        return grooved_way(self.bent(x), NoW, hidden, T, left)
 
-    def meet(self, i: Any, o: Any, lean2: Scalar) -> Colour:
-        if self.film is None:
-            top: Any = coat_lobe(self.coat, i.NoW, o.NoW, i.hidden, o.hidden, lean2)
-        else:
-            top = filmed_lobe(self.film, self.coat, i.NoW, o.NoW, i.hidden, o.hidden, lean2)
-        rest = i.left * o.left
-        if self.grooves is None:
-            return top + rest
-        shape = grooves_full if self.grooves.form == "full" else grooves_qualitative
-        return top + rest * shape(self.grooves, i, o, 0.5 * (lean2 - i.sin2 - o.sin2))
+    def meet(self, i: Any, o: Any, lean2: Scalar, lit: Flag) -> Colour:
+        lobe = coat_lobe if self.film is None else coat_shape
+        top: Any = where(lit, lobe(self.coat, i.NoW, o.NoW, i.hidden, o.hidden, lean2), 0.0)
+        if self.film is not None:
+            M = i.NoW + o.NoW
+            top = self.film(half_root(lean2 + M * M)) * top
+        passed: Any = i.passed * o.passed
+        if self.grooves is not None:
+            shape = grooves_full if self.grooves.form == "full" else grooves_qualitative
+            passed = passed * shape(self.grooves, i, o, 0.5 * (lean2 - i.sin2 - o.sin2))
+        # All colours are finite below the surface too. To choose numbers, not the sum, takes an eighth off the time of four lights.
+        return top + i.left * o.left * where(lit, passed, 0.0)
 
 
 @chunk
-def grooved_way(bent: Any, NoW: Scalar, hidden: Scalar, left: Colour) -> GroovedWay:
+def grooved_way(bent: Any, NoW: Scalar, hidden: Scalar, passed: Scalar, left: Colour) -> GroovedWay:
     """What grooves ask for of one direction below the coat."""
     sin2 = (1.0 - NoW) * (1.0 + NoW)
     sine = safe_sqrt(sin2)
     bend = bent[0]
     z = jnp.sqrt(1.0 - bend * bend * sin2)
-    return GroovedWay(NoW, hidden, left, sin2, sine, bend, z, bent[1] * (bend * sine))
+    return GroovedWay(NoW, hidden, passed, left, sin2, sine, bend, z, bent[1] * (bend * sine))
 
 
 @chunk

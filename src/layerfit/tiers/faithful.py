@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._chunk import chunk, divide, member, static, struct, where
-from .._types import Colour, Scalar
+from .._types import Colour, Flag, Scalar
 from ..forms import faithful
 from ..layers import Coat
 from .polynomial import Curve, Polynomial
@@ -55,7 +55,7 @@ class FaithfulUnderCoat(Compact):
     def way(self, NoW: Scalar) -> FaithfulWay:
         return way_in(self.coat, NoW)
 
-    def meet(self, i: FaithfulWay, o: FaithfulWay, lean2: Scalar) -> Colour:
+    def meet(self, i: FaithfulWay, o: FaithfulWay, lean2: Scalar, lit: Flag) -> Colour:
         top = faithful_top(self.coat, i, o, lean2)
         inverse = 1.0 / self.coat.eta
         z_i, z_o = i.NoW * inverse + top.turn, o.NoW * inverse + top.turn
@@ -68,7 +68,7 @@ class FaithfulUnderCoat(Compact):
         if self.coat.tau is not None:
             rest = rest * jnp.exp(-(self.coat.tau * ((z_i + z_o) / (z_i * z_o))))
         f = top.reflected + rest
-        return where(jnp.minimum(z_i, z_o) > 0.0, f, top.reflected)
+        return where(lit, where(jnp.minimum(z_i, z_o) > 0.0, f, top.reflected), 0.0)
 
 
 def way_in(coat: Coat, NoW: Scalar) -> FaithfulWay:

@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .._chunk import chunk, member, static, struct
-from .._types import Colour, Scalar, Vec2
+from .._chunk import chunk, member, static, struct, where
+from .._types import Colour, Flag, Scalar, Vec2
 from ..forms import one_coat
 from ..forms.bounces import amount, wider
 from ..forms.curves import blurred2, curve, grazing, presence, spread_root
@@ -76,7 +76,7 @@ class PreciseMetal(Compact):
     def way(self, NoW: Scalar) -> PreciseWay:
         return precise_way(self.passed, self.bent, self.rest, self.again, self.coat, self.tilt, NoW)
 
-    def meet(self, i: PreciseWay, o: PreciseWay, lean2: Scalar) -> Colour:
+    def meet(self, i: PreciseWay, o: PreciseWay, lean2: Scalar, lit: Flag) -> Colour:
         between = metal_between(self.widths, self.condense, self.least, i, o, lean2)
         lobes = metal_lobes(self.widths, i, o, between)
         F = self.reflectance(between.h2)
@@ -97,7 +97,7 @@ class PreciseMetal(Compact):
             throughput = throughput * (jnp.exp(-(2.0 * self.coat.tau + depth)) if self.left is None else self.left(depth))
             U = (1.0 + path_i * self.unspread(theta_i)) * (1.0 + path_o * self.unspread(theta_o))
         top = coat_lobe(self.coat, i.NoW, o.NoW, i.hidden, o.hidden, lean2)
-        return top + throughput * (F * U * (rise * lobes[0] + again) + rest)
+        return where(lit, top + throughput * (F * U * (rise * lobes[0] + again) + rest), 0.0)
 
 
 @struct

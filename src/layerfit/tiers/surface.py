@@ -8,9 +8,10 @@ from typing import Any, Literal, get_args
 import jax.numpy as jnp
 import numpy as np
 
-from .._types import Colour, Scalar, Vec3
+from .._types import Colour, Flag, Scalar, Vec3
 from ..forms.curves import grazing
 from ..layers import Coat
+from ..optics.directions import above, both_above
 from ..surfaces.base import Surface
 from .polynomial import MIDDLE, Curve, Polynomial
 
@@ -40,13 +41,17 @@ class Compact(Surface):
         """What becomes of one direction."""
 
     @abstractmethod
-    def meet(self, i: Any, o: Any, lean2: Scalar) -> Colour:
-        """BRDF [1/sr] of two of them; `lean2` is the squared length of the sum of their parts along the surface."""
+    def meet(self, i: Any, o: Any, lean2: Scalar, lit: Flag) -> Colour:
+        """BRDF [1/sr] of two of them; `lean2` is the squared length of the sum of their parts along the surface.
+
+        It is 0 where they are not `lit`, below the surface.
+        """
 
     def shade(self, NoL: Scalar, NoV: Scalar, lean2: Scalar) -> Colour:
-        """BRDF [1/sr] of directions above the surface."""
-        way_i, way_o = self.way(NoL), self.way(NoV)
-        return self.meet(way_i, way_o, lean2)
+        """BRDF [1/sr]; 0 below the surface."""
+        lit = both_above(NoL, NoV)
+        way_i, way_o = self.way(above(lit, NoL)), self.way(above(lit, NoV))
+        return self.meet(way_i, way_o, lean2, lit)
 
     def evaluate(self, wi: Vec3, wo: Vec3) -> Colour:
         """The same of directions in the frame of the surface."""

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._chunk import fetch, safe_sqrt, static, struct, where
-from .._types import Colour, Scalar
+from .._types import Colour, Flag, Scalar
 from ..forms import faithful
 from ..layers import Coat
 from .faithful import FaithfulWay, way_in
@@ -48,7 +48,7 @@ class Precomputed(Compact):
     def way(self, NoW: Scalar) -> FaithfulWay:
         return way_in(self.coat, NoW)
 
-    def meet(self, i: FaithfulWay, o: FaithfulWay, lean2: Scalar) -> Colour:
+    def meet(self, i: FaithfulWay, o: FaithfulWay, lean2: Scalar, lit: Flag) -> Colour:
         M = i.NoW + o.NoW
         s2 = lean2 + M * M
         c = 0.5 * jnp.sqrt(s2)
@@ -69,7 +69,7 @@ class Precomputed(Compact):
         if self.coat.tau is not None:
             rest = rest * jnp.exp(-(self.coat.tau * ((z_i + z_o) / (z_i * z_o))))
         f = top + rest
-        return where(jnp.minimum(z_i, z_o) > 0.0, f, top)
+        return where(lit, where(jnp.minimum(z_i, z_o) > 0.0, f, top), 0.0)
 
     def facing(self, lean: Scalar, M: Scalar, s2: Scalar, alpha: Scalar) -> Scalar:
         """D [1/sr] of facets of a width, about a sum of directions whose parts are `lean` along the surface and `M` upwards."""

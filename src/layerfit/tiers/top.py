@@ -13,11 +13,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._chunk import chunk, divide, member, struct
-from .._types import Colour, Scalar
+from .._types import Scalar
 from ..layers import Coat
 from ..surfaces.base import Lobe
 from ..surfaces.film import Baked
-from .polynomial import MOST, Curve, Polynomial
+from .polynomial import MOST, Curve
 from .surface import NODES, half_root
 
 
@@ -63,16 +63,13 @@ def coat_lobe(coat: Coat, NoL: Scalar, NoV: Scalar, hidden_l: Scalar, hidden_v: 
 
 
 @chunk
-def filmed_lobe(
-    film: Polynomial, coat: Coat, NoL: Scalar, NoV: Scalar, hidden_l: Scalar, hidden_v: Scalar, lean2: Scalar
-) -> Colour:
-    """F D V of the coat's top with a film, by the polynomial of its reflectance."""
+def coat_shape(coat: Coat, NoL: Scalar, NoV: Scalar, hidden_l: Scalar, hidden_v: Scalar, lean2: Scalar) -> Scalar:
+    """D V of the coat's top: `ggx_d` and `v_smith`."""
     M = NoL + NoV
     M2 = M * M
-    s2 = lean2 + M2
-    ratio = divide(coat.alpha * s2, lean2 + (coat.alpha * coat.alpha) * M2)
+    ratio = divide(coat.alpha * (lean2 + M2), lean2 + (coat.alpha * coat.alpha) * M2)
     V = (0.5 / math.pi) / (NoV * hidden_l + NoL * hidden_v)
-    return film(half_root(s2)) * (ratio * ratio * V)
+    return ratio * ratio * V
 
 
 def filmed(lobe: Lobe) -> bool:
