@@ -18,7 +18,7 @@ from layerfit.render import brdf, brdf_values, predict
 from layerfit.shader.choose import choose_tier
 from layerfit.shader.cost import instructions
 from layerfit.shader.export import print_material
-from layerfit.shader.verify import check_pairs
+from layerfit.shader.verify import check_pairs, shade_samples
 from layerfit.stability.models import structures
 from layerfit.stack import Stack
 from layerfit.surfaces import Conductor, Flakes, Lambert, OrenNayar
@@ -107,6 +107,17 @@ def test_the_shader_is_the_jax_function(gl, name):
     parity = check_pairs(shader, 16384)
     assert parity.passed, parity
     assert f"within {made(name).error:.1e}" in shader.text()
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_below_the_surface_there_is_nothing(gl, name):
+    shader = print_material(made(name).stack, "test")
+    wi, wo = random_pairs(3000, seed=8)
+    wi[1000:, 2] *= -1.0  # the light below, and both
+    wo[:2000, 2] *= -1.0  # the viewer below, and both
+    place = random_places(3000, seed=8) if shader.stack.reads else None
+    values = shade_samples(shader, wi[:, None], wo, np.ones((3000, 1, 3), np.float32), place)
+    assert np.all(values == 0.0)
 
 
 def test_the_exported_shader_draws_it_without_a_frame(gl):
