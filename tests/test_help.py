@@ -103,6 +103,7 @@ def test_an_example_runs(example, workplace, gl, tmp_path, monkeypatch):
     monkeypatch.setattr("layerfit.shader.cost.LEAST_MS", 0.1)
     monkeypatch.setattr("layerfit.shader.cost.SIDE", 64)
     monkeypatch.setattr(import_module("layerfit.study.variants"), "COMPACT_ERRORS", (1e-2,))
+    monkeypatch.setattr(import_module("layerfit.study.variants"), "TABLE_ENTRIES", (16,))
     monkeypatch.setattr("layerfit.view.serve", lambda text, ready, open_browser: ready("http://127.0.0.1/"))
     words = shlex.split(example)[1:]
     ran = layerfit(*words, *(less for word in words for less in LESS.get(word, ())))
