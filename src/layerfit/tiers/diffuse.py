@@ -30,7 +30,7 @@ class DiffuseWay:
     NoW: Scalar = member("cosine above")
     hidden: Scalar = member("NoW (1 + 2 Lambda) of the coat's facets")
     passed: Scalar = member("energy that passes the coat's top")
-    left: Colour = member("what is left of it of the square root of the share of the light that leaves, one way")
+    left: Colour = member("square root of the share of the light that leaves, one way, over what passed")
 
 
 @struct
@@ -40,7 +40,7 @@ class GroovedWay:
     NoW: Scalar = member("cosine above")
     hidden: Scalar = member("NoW (1 + 2 Lambda) of the coat's facets")
     passed: Scalar = member("energy that passes the coat's top")
-    left: Colour = member("what is left of it of the square root of the share of the light that leaves, one way")
+    left: Colour = member("square root of the share of the light that leaves, one way, over what passed")
     sin2: Scalar = member("squared sine above")
     sine: Scalar = member("sine above")
     bend: Scalar = member("sine below over that above")
