@@ -136,11 +136,8 @@ template <class A, class B, class C> vec3(A, B, C) -> vec3<decltype(A() + B() + 
 template <class T> struct vec4 {
     T x, y, z, w;
     template <class A, class B, class C, class D> INLINE vec4(A x, B y, C z, D w) : x(as<T>(x)), y(as<T>(y)), z(as<T>(z)), w(as<T>(w)) {}
-    template <class A, class B> INLINE vec4(vec3<A> a, B w) : vec4(a.x, a.y, a.z, w) {}
-    INLINE auto xyz() const { return vec3<T>(x, y, z); }
 };
 template <class A, class B, class C, class D> vec4(A, B, C, D) -> vec4<decltype(A() + B() + C() + D())>;
-template <class A, class B> vec4(vec3<A>, B) -> vec4<decltype(A() + B())>;
 template <class D, class... V> INLINE auto three(D f, V... v) {
     const auto x = f(v.x...);
     return vec3<std::remove_const_t<decltype(x)>>(x, f(v.y...), f(v.z...));
@@ -160,12 +157,7 @@ ONE operator-(vec3<A> a) { return three([](auto a) LAMBDA { return -a; }, a); }
 ONE exp(vec3<A> a) { return three([](auto a) LAMBDA { return exp(a); }, a); }
 ONE sqrt(vec3<A> a) { return three([](auto a) LAMBDA { return sqrt(a); }, a); }
 ONE abs(vec3<A> a) { return three([](auto a) LAMBDA { return abs(a); }, a); }
-// A direction without a frame: its part along the surface, and its cosine.
-TWO operator+(vec4<A> a, vec4<B> b) { return vec4(a.xyz() + b.xyz(), a.w + b.w); }
-TWO operator*(vec4<A> a, B b) { return vec4(a.xyz() * b, a.w * b); }
-TWO operator*(A a, vec4<B> b) { return vec4(a * b.xyz(), a * b.w); }
 ONE inversesqrt(A x) { return 1.0f / sqrt(x); }
-TWO dot(vec4<A> a, vec4<B> b) { return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w; }
 TWO dot(vec3<A> a, vec3<B> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 TWO lessThan(vec3<A> a, vec3<B> b) { return three([](auto a, auto b) LAMBDA { return value(a) < value(b); }, a, b); }
 template <class A, class B, class C> INLINE auto mix(vec3<A> no, vec3<B> yes, vec3<C> which) {

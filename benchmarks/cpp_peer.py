@@ -54,8 +54,8 @@ COMMAND = ["g++", "-std=c++20", "-O3", "-march=native", "-fopenmp", "-fsingle-pr
 LOOPS = """
 constexpr int BLOCK = 256;
 INLINE auto shade(auto m, const float *wi, const float *wo, int i, int n) {
-    return lf_evaluate(m, vec4(load(wi + i), load(wi + n + i), 0.0f, load(wi + 2 * n + i)),
-                       vec4(load(wo + i), load(wo + n + i), 0.0f, load(wo + 2 * n + i)));
+    return lf_evaluate(m, FreeDirection(vec3(load(wi + i), load(wi + n + i), 0.0f), load(wi + 2 * n + i)),
+                       FreeDirection(vec3(load(wo + i), load(wo + n + i), 0.0f), load(wo + 2 * n + i)));
 }
 
 extern "C" void values(const float *numbers, const float *wi, const float *wo, const float *weight, float *out, int n) {
@@ -160,7 +160,7 @@ def struct(name: str, fields: Sequence[str]) -> str:
 def cpp(stack: Stack) -> str:
     """The printed material as C++: structs and functions as printed, constants as a `Material` that is read at run time."""
     printed = print_material(stack, "peer").functions.partition("vec3 lf_brdf(")[0]
-    text = re.sub(r" *//.*", "", printed).replace("lf_evaluate(", "lf_evaluate(Material m, ").replace(".xyz", ".xyz()")
+    text = re.sub(r" *//.*", "", printed).replace("lf_evaluate(", "lf_evaluate(Material m, ")
     structs = re.findall(r"^struct (\w+) \{(.*?)^\};", text, re.M | re.S)
     fields = {name: re.findall(r"(\w+) (\w+);", lines) for name, lines in structs}
     constants = re.findall(r"^const (\w+) (lf_\w+) = ", text, re.M)

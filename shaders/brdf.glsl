@@ -10,6 +10,6 @@ vec3 lf_brdf(@FRAME@) {
 vec3 lf_brdf(@FRAME@) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV)@THERE@);
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV)@THERE@);
 }
 //@ end

@@ -38,6 +38,6 @@ void main() {
     color = vec4(lf_evaluate(v_wi, v_wo@THERE@) * v_weight, 1.0);
 //@ end
 //@ if free
-    color = vec4(lf_evaluate(vec4(v_wi.xy, 0.0, v_wi.z), vec4(v_wo.xy, 0.0, v_wo.z)@THERE@) * v_weight, 1.0);
+    color = vec4(lf_evaluate(FreeDirection(vec3(v_wi.xy, 0.0), v_wi.z), FreeDirection(vec3(v_wo.xy, 0.0), v_wo.z)@THERE@) * v_weight, 1.0);
 //@ end
 }

@@ -315,7 +315,7 @@ def test_a_shader_says_what_no_texture_can_hold():
         print_material(STACK, "m", maps=["coat.alph"])
     with pytest.raises(InputError, match="leave uniforms out"):
         print_material(STACK, "m", uniforms=True, maps=["coat.alpha"])
-    assert "vec3 lf_evaluate(vec4 wi, vec4 wo, float coat_thickness_um)" in print_material(
+    assert "vec3 lf_evaluate(FreeDirection wi, FreeDirection wo, float coat_thickness_um)" in print_material(
         precise, "m", maps=["coat.thickness_um"]
     ).text("essl300")
 

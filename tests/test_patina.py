@@ -191,7 +191,7 @@ def test_a_patina_validates(name, tmp_path):
 
 def test_what_a_patina_does_without_is_not_in_its_text():
     text = print_material(PATINAS["crust"], "crust").text()
-    assert "vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {" in text
+    assert "vec3 lf_evaluate(FreeDirection wi, FreeDirection wo, vec2 uv) {" in text
     assert "henyey" not in text
     assert "tau" not in text
     assert "kubelka" in text

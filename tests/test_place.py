@@ -54,7 +54,7 @@ FORMS = {
 @pytest.mark.parametrize("name", FORMS)
 def test_every_form_takes_a_place(gl, name):
     shader = print_material(FORMS[name], name)
-    assert "lf_evaluate(vec4 wi, vec4 wo, vec2 uv, float distance)" in shader.functions
+    assert "lf_evaluate(FreeDirection wi, FreeDirection wo, vec2 uv, float distance)" in shader.functions
     assert check_pairs(shader, 6000).passed
 
 
@@ -90,7 +90,7 @@ def test_others_are_not_asked_for_a_place():
     text = print_material(STACKS["corrected over conductor"], "m").text()
     assert "uv" not in text
     assert "float distance =" not in text
-    assert "lf_evaluate(vec4 wi, vec4 wo)" in text
+    assert "lf_evaluate(FreeDirection wi, FreeDirection wo)" in text
 
 
 def test_a_sphere_has_texture_coordinates():

@@ -301,7 +301,7 @@ def test_the_text_reads_as_written_by_hand():
 
 def test_what_a_material_does_without_is_not_in_its_text():
     clear = print_material(STACKS["corrected, clear coat"], "clear").text()
-    assert "exp(" not in clear.split("lf_evaluate(vec4 wi")[1].split("lf_brdf")[0]
+    assert "exp(" not in clear.split("lf_evaluate(FreeDirection wi")[1].split("lf_brdf")[0]
     assert "tau" not in clear
     assert "anisotropic" not in clear
     bare = print_material(STACKS["lambert"], "paper").text()

@@ -92,21 +92,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.10512833, 0.102331646, 0.09692576),       // c0: coefficients of the powers of the curves' argument
-    vec3(0.0039771255, 0.0039688554, 0.0039587766),  // c1: 
-    vec3(0.0035902523, 0.0035372674, 0.003435079),   // c2: 
-    vec3(0.015053898, 0.014642313, 0.013853088),     // c3: 
-    vec3(-0.01022432, -0.009831063, -0.009081136),   // c4: 
-    vec3(-0.018423408, -0.017812818, -0.016645864)   // c5: 
+    vec3(0.1051283, 0.10233161, 0.096925735),       // c0: coefficients of the powers of the curves' argument
+    vec3(0.003977226, 0.0039688814, 0.003958853),   // c1: 
+    vec3(0.003590621, 0.00353764, 0.0034353547),    // c2: 
+    vec3(0.015053451, 0.01464209, 0.013852745),     // c3: 
+    vec3(-0.01022467, -0.009831402, -0.009081386),  // c4: 
+    vec3(-0.018423066, -0.01781261, -0.01664561)    // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.24074851, 0.23902489, 0.23320916),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0042296275, -0.0042496063, -0.004206687),  // c1: 
-    vec3(0.0035167485, 0.003613688, 0.0037837103),     // c2: 
-    vec3(0.023409933, 0.02358675, 0.023740083),        // c3: 
-    vec3(-0.026114777, -0.025942773, -0.025363848),    // c4: 
-    vec3(-0.036583543, -0.036527514, -0.036092997)     // c5: 
+    vec3(0.24074857, 0.23902494, 0.23320921),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0042296164, -0.004249595, -0.0042067617),  // c1: 
+    vec3(0.0035166293, 0.0036134645, 0.0037835091),    // c2: 
+    vec3(0.023409754, 0.02358687, 0.023740351),        // c3: 
+    vec3(-0.026114613, -0.02594255, -0.025363632),     // c4: 
+    vec3(-0.036583394, -0.036527455, -0.036093116)     // c5: 
 );
 
 const Interface lf_oxide_across = Interface(
@@ -163,7 +163,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
@@ -205,16 +205,17 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+    float inverse = inversesqrt(dot(s, s));
+    return s * inverse;
 }
 
 // Anisotropic GGX density of facet normals (Burley 2012, eq. 13).
@@ -272,11 +273,11 @@ vec3 lf_spread_root(float theta, vec3 tau) {
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 twice_abc = nk * (2.0 * c);
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q - p);
+    vec3 twice_abc = 1.4142135 * nk2 * c;
     vec3 even = larger * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = larger * (q + c2);

@@ -44,14 +44,21 @@ struct Curve {
     vec3 c5;  // 
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 struct Crossing {
-    vec4 w;       // median direction
-    float T;      // energy that passes
-    float a;      // spread, as a width
-    float path;   // mean path, in thicknesses
-    float theta;  // scale of the path's distribution
-    float s;      // argument of the baked curves
-    vec4 air;     // direction above
+    vec3 w_along;      // median direction: part along the surface, in any space
+    float w_cosine;    // median direction: cosine to its normal
+    float T;           // energy that passes
+    float a;           // spread, as a width
+    float path;        // mean path, in thicknesses
+    float theta;       // scale of the path's distribution
+    float s;           // argument of the baked curves
+    vec3 air_along;    // direction above: part along the surface, in any space
+    float air_cosine;  // direction above: cosine to its normal
 };
 
 struct Shares {
@@ -88,21 +95,21 @@ const Conductor lf_aluminium = Conductor(
 );
 
 const Curve lf_oxide_again = Curve(
-    vec3(0.051936053, 0.18103969, 0.47650972),        // c0: coefficients of the powers of the curves' argument
-    vec3(0.004146279, 0.0032683462, -0.029494986),    // c1: 
-    vec3(0.0013731662, 0.004224308, 0.007571906),     // c2: 
-    vec3(0.0046937168, 0.023301825, 0.069637775),     // c3: 
-    vec3(-0.002068311, -0.018003501, -0.06537786),    // c4: 
-    vec3(-0.0049090683, -0.030430347, -0.098968506)   // c5: 
+    vec3(0.051936075, 0.18103975, 0.47650993),       // c0: coefficients of the powers of the curves' argument
+    vec3(0.0041462304, 0.003268253, -0.02949474),    // c1: 
+    vec3(0.0013731495, 0.0042241663, 0.007571563),   // c2: 
+    vec3(0.004693739, 0.02330193, 0.069636405),      // c3: 
+    vec3(-0.0020682998, -0.018003404, -0.06537761),  // c4: 
+    vec3(-0.004909046, -0.030430287, -0.09896755)    // c5: 
 );
 
 const Curve lf_oxide_rest = Curve(
-    vec3(0.16026907, 0.338931, 0.6975374),             // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0019091107, -0.0055994317, -0.030132934),  // c1: 
-    vec3(0.009909097, 0.008327529, 0.0119867325),      // c2: 
-    vec3(0.022142217, 0.02277264, 0.03917432),         // c3: 
-    vec3(-0.021037824, -0.03679514, -0.07271966),      // c4: 
-    vec3(-0.029286027, -0.04327643, -0.08268857)       // c5: 
+    vec3(0.1602691, 0.33893102, 0.69753754),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.0019090921, -0.0055994317, -0.03013292),  // c1: 
+    vec3(0.0099090375, 0.008327574, 0.011986792),     // c2: 
+    vec3(0.022142217, 0.022772104, 0.03917426),       // c3: 
+    vec3(-0.021037765, -0.036795273, -0.07271987),    // c4: 
+    vec3(-0.029285982, -0.043275982, -0.08268833)     // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -111,8 +118,8 @@ float lf_grazing(float NoW) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec4 w, float tilt) {
-    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+float lf_facet_cosine(FreeDirection w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.cosine * w.cosine));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -121,7 +128,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
@@ -136,23 +143,24 @@ float lf_curve(vec4 low, vec2 high, float s) {
 }
 
 // Follow one direction through the coat's rough top.
-Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w) {
-    float s = lf_grazing(w.w);
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, FreeDirection w) {
+    float s = lf_grazing(w.cosine);
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
     float bend = lf_curve(interface_.bend, interface_.bend_high, s);
-    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
+    float z = sqrt(w.cosine * w.cosine + bend * (2.0 - bend) * dot(w.along, w.along));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
+    return Crossing(w.along * (1.0 - bend), z, T, a, path, theta, s, w.along, w.cosine);
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -163,28 +171,30 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -199,22 +209,22 @@ float lf_presence(float eta) {
 
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, float alpha) {
-    float base = alpha * (i.w.w + o.w.w);
+    float base = alpha * (i.w_cosine + o.w_cosine);
     float inverse = 1.0 / (base + i.a + o.a);
     return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
-    vec3 turn = 0.8241 * share * (i.w.xyz + o.w.xyz);
-    float z2 = x.w.w * x.w.w;
-    z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
-    return vec4(x.w.xyz - turn, sqrt(z2));
+FreeDirection lf_lean(Crossing x, Crossing i, Crossing o, float share) {
+    vec3 turn = 0.8241 * share * (i.w_along + o.w_along);
+    float z2 = x.w_cosine * x.w_cosine;
+    z2 = max(z2 + dot(turn, 2.0 * x.w_along - turn), min(z2, 0.0004));
+    return FreeDirection(x.w_along - turn, sqrt(z2));
 }
 
 // Mean path of light that the base sends on: between that of one direction and that of all that cross.
-float lf_between(vec4 y, Crossing x, float part) {
-    float straight = 1.0 / y.w;
+float lf_between(FreeDirection y, Crossing x, float part) {
+    float straight = 1.0 / y.cosine;
     return straight + part * (x.path - straight);
 }
 
@@ -227,11 +237,11 @@ vec3 lf_spread_root(float theta, vec3 tau) {
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 twice_abc = nk * (2.0 * c);
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q - p);
+    vec3 twice_abc = 1.4142135 * nk2 * c;
     vec3 even = larger * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = larger * (q + c2);
@@ -254,7 +264,7 @@ float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
     float width2 = lf_blurred2(base, i.a + o.a);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t = i.w.xyz + o.w.xyz;
+    vec3 t = i.w_along + o.w_along;
     float v = dot(t, t) / width2;
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
@@ -266,48 +276,50 @@ float lf_wider(float alpha, float coat_alpha) {
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float alpha) {
-    vec3 apart = i.air.xyz - o.air.xyz;
-    float back = 0.5 * (dot(apart, apart) + i.air.w * i.air.w + o.air.w * o.air.w);
+    vec3 apart = i.air_along - o.air_along;
+    float back = 0.5 * (dot(apart, apart) + i.air_cosine * i.air_cosine + o.air_cosine * o.air_cosine);
     return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
-float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
-    float M = yi.w + yo.w;
+float lf_seen(FreeDirection yi, FreeDirection yo, float h2, float width) {
+    float M = yi.cosine + yo.cosine;
     float slope = h2 / M;
     float projection_i = lf_ggx_projection(yi, width);
     float projection_o = lf_ggx_projection(yo, width);
-    return slope * slope * (yi.w * yo.w) * lf_v_smith(yi.w, yo.w, projection_i, projection_o);
+    return slope * slope * (yi.cosine * yo.cosine) * lf_v_smith(yi.cosine, yo.cosine, projection_i, projection_o);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     Crossing crossing = lf_pass_interface(lf_oxide_interface, lf_oxide.eta, lf_oxide.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_oxide_interface, lf_oxide.eta, lf_oxide.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_oxide.eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_oxide.alpha);
+    FreeDirection direction = lf_half_vector(wi, wo);
+    float D = lf_ggx_d(direction, lf_oxide.alpha);
     float projection_i = lf_ggx_projection(wi, lf_oxide.alpha);
     float projection_o = lf_ggx_projection(wo, lf_oxide.alpha);
-    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_oxide.eta * lf_oxide.eta);
     float there = lf_presence(lf_oxide.eta);
     Shares shares = lf_split(crossing, crossing2, lf_aluminium.alpha);
     float part = 0.7911 * shares.base;
-    vec4 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
+    FreeDirection yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    FreeDirection yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_oxide.tau);
     vec3 root_o = lf_spread_root(part * crossing2.theta, lf_oxide.tau);
     vec3 U = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
     vec3 throughput2 = throughput * exp(-(lf_oxide.tau + (path_i - 1.0) * (2.0 * lf_oxide.tau / (1.0 + root_i)) + (lf_oxide.tau + (path_o - 1.0) * (2.0 * lf_oxide.tau / (1.0 + root_o)))));
-    vec4 h = yi + yo;
-    float h2 = dot(h, h);
+    vec3 along = yi.along + yo.along;
+    float cosine = yi.cosine + yo.cosine;
+    float h2 = dot(along, along) + cosine * cosine;
     vec3 F2 = lf_fresnel_conductor(min(0.5 * sqrt(h2), 1.0), lf_aluminium.eta, lf_aluminium.k);
     float rise = 1.0 + 0.3861 * there * lf_oxide.alpha * lf_oxide.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_oxide_again, crossing.s) * lf_amount(lf_oxide_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_aluminium.alpha, lf_oxide.alpha));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, cosine, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, cosine, lf_wider(lf_aluminium.alpha, lf_oxide.alpha));
     vec3 root = lf_amount(lf_oxide_rest, crossing.s) * lf_amount(lf_oxide_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_aluminium.alpha);
     vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);
@@ -318,7 +330,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

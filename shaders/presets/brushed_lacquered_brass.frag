@@ -90,21 +90,21 @@ const Conductor lf_brass = Conductor(
 );
 
 const Curve lf_lacquer_again = Curve(
-    vec3(0.42249948, 0.41596282, 0.40688264),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.014193013, -0.013624191, -0.01424437),   // c1: 
-    vec3(0.002750039, 0.0018187016, -0.0003841594),  // c2: 
-    vec3(-0.013451636, -0.015931964, -0.02210188),   // c3: 
-    vec3(-0.07764308, -0.07594618, -0.074483424),    // c4: 
-    vec3(-0.057833612, -0.054946333, -0.051087588)   // c5: 
+    vec3(0.42249948, 0.415963, 0.40688267),            // c0: coefficients of the powers of the curves' argument
+    vec3(-0.014192708, -0.013623945, -0.014244072),    // c1: 
+    vec3(0.0027496144, 0.0018178225, -0.00038444996),  // c2: 
+    vec3(-0.013452828, -0.015932798, -0.02210319),     // c3: 
+    vec3(-0.07764253, -0.07594529, -0.07448298),       // c4: 
+    vec3(-0.05783233, -0.054945737, -0.051086456)      // c5: 
 );
 
 const Curve lf_lacquer_rest = Curve(
-    vec3(0.83247924, 0.71440005, 0.44934726),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.04279007, -0.03641057, -0.025350243),   // c1: 
-    vec3(0.025562942, 0.020827621, 0.011006519),    // c2: 
-    vec3(0.015206754, 0.0070168376, -0.005005002),  // c3: 
-    vec3(-0.13221595, -0.11567819, -0.07749818),    // c4: 
-    vec3(-0.12762225, -0.10791618, -0.067614496)    // c5: 
+    vec3(0.8324791, 0.71440005, 0.44934717),        // c0: coefficients of the powers of the curves' argument
+    vec3(-0.042789742, -0.036410406, -0.02534993),  // c1: 
+    vec3(0.02556324, 0.020827562, 0.011006579),     // c2: 
+    vec3(0.015206099, 0.007016659, -0.005005628),   // c3: 
+    vec3(-0.13221595, -0.11567798, -0.07749818),    // c4: 
+    vec3(-0.1276223, -0.107916296, -0.06761408)     // c5: 
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -123,7 +123,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
@@ -165,22 +165,23 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+    float inverse = inversesqrt(dot(s, s));
+    return s * inverse;
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
 float lf_ggx_d(vec3 h, float alpha) {
-    float root = alpha / (dot(h.xy, h.xy) + alpha * alpha * (h.z * h.z));
-    return root * root * 0.31830987;
+    float root = alpha * 0.5641896 / (dot(h.xy, h.xy) + alpha * alpha * (h.z * h.z));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
@@ -229,11 +230,11 @@ vec3 lf_spread_root(float theta, vec3 tau) {
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 twice_abc = nk * (2.0 * c);
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q - p);
+    vec3 twice_abc = 1.4142135 * nk2 * c;
     vec3 even = larger * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = larger * (q + c2);

@@ -31,13 +31,13 @@ float lf_half_cosine(vec3 wi, vec3 wo) {
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q + abs(p));
     bvec3 metal = lessThan(p, vec3(0.0));
     vec3 b = mix(vec3(1.0), larger, metal);
-    vec3 twice_abc = mix(larger, nk, metal) * (2.0 * c);
+    vec3 twice_abc = 1.4142135 * mix(larger, nk2, metal) * c;
     vec3 even = b * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = b * (q + c2);
@@ -47,7 +47,8 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+    float inverse = inversesqrt(dot(s, s));
+    return s * inverse;
 }
 
 // Anisotropic GGX density of facet normals (Burley 2012, eq. 13).

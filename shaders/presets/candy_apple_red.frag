@@ -193,22 +193,23 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+    float inverse = inversesqrt(dot(s, s));
+    return s * inverse;
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
 float lf_ggx_d(vec3 h, float alpha) {
-    float root = alpha / (dot(h.xy, h.xy) + alpha * alpha * (h.z * h.z));
-    return root * root * 0.31830987;
+    float root = alpha * 0.5641896 / (dot(h.xy, h.xy) + alpha * alpha * (h.z * h.z));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
@@ -233,7 +234,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
@@ -251,7 +252,8 @@ float lf_drift(vec3 w, float scale, float alpha) {
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
 vec3 lf_refract_about_normal(vec3 w, float eta) {
     float z2 = (eta - 1.0) * (eta + 1.0) + w.z * w.z;
-    return vec3(w.xy, sqrt(z2)) * (1.0 / eta);
+    float inverse = 1.0 / eta;
+    return vec3(w.xy, sqrt(z2)) * inverse;
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
@@ -272,7 +274,7 @@ Crossing lf_cross(Interface interface_, Coat coat, vec3 w, vec3 air) {
 
 // Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
 vec3 lf_transmittance(vec3 tau, float path) {
-    return exp(-(tau * path));
+    return exp(-tau * path);
 }
 
 // Turn a direction, azimuth kept, until its path 1 / w.z is longer by `lengthening`.
@@ -287,11 +289,11 @@ vec3 lf_steer(vec3 w, float lengthening) {
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 twice_abc = nk * (2.0 * c);
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q - p);
+    vec3 twice_abc = 1.4142135 * nk2 * c;
     vec3 even = larger * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = larger * (q + c2);

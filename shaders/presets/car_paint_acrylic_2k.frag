@@ -17,6 +17,11 @@ struct CarPaint {
     float alpha_2;  // width of the facet slopes of the second lobe; the square of an artist's roughness
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 const CarPaint lf_paint = CarPaint(
     vec3(0.42, 0.32, 0.1),        // kd: diffuse part
     vec3(0.028, 0.026, 0.006),    // ks: strength of the lobe
@@ -28,15 +33,18 @@ const CarPaint lf_paint = CarPaint(
 );
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Schlick 1994, eq. 15, from the reflectance at normal incidence.
@@ -47,25 +55,26 @@ float lf_fresnel_schlick(float c, float f0) {
 }
 
 // G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10).
-float lf_v_cavity(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float NoH_over_c = 2.0 * s.w / dot(s, s);
-    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(wi.w, wo.w));
+float lf_v_cavity(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float NoH_over_c = 2.0 * cosine / (dot(along, along) + cosine * cosine);
+    return min(0.25 / max(wi.cosine * wo.cosine, 1e-14), 0.5 * NoH_over_c / max(wi.cosine, wo.cosine));
 }
 
 // Beckmann density of facet normals (Cook and Torrance 1982, eq. 14, normalised).
-float lf_beckmann_d(vec4 h, float alpha) {
-    bool above = h.w > 1e-04;
-    float value = h.w * h.w;
+float lf_beckmann_d(FreeDirection h, float alpha) {
+    bool above = h.cosine > 1e-04;
+    float value = h.cosine * h.cosine;
     float inverse = 1.0 / (above ? value : 1.0);
-    value = exp(-(dot(h.xyz, h.xyz) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha));
+    value = exp(-(dot(h.along, h.along) / (alpha * alpha)) * inverse) * (inverse * inverse) / (3.1415927 * (alpha * alpha));
     return above ? value : 0.0;
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
-    vec4 h = lf_half_vector(wi, wo);
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
+    FreeDirection h = lf_half_vector(wi, wo);
     float c = lf_half_cosine(wi, wo);
     float V = lf_v_cavity(wi, wo);
     float D = lf_beckmann_d(h, lf_paint.alpha);
@@ -79,7 +88,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

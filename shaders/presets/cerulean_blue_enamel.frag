@@ -31,14 +31,21 @@ struct Lambert {
     vec3 albedo;  // part of the light that is sent back
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 struct Crossing {
-    vec4 w;       // median direction
-    float T;      // energy that passes
-    float a;      // spread, as a width
-    float path;   // mean path, in thicknesses
-    float theta;  // scale of the path's distribution
-    float s;      // argument of the baked curves
-    vec4 air;     // direction above
+    vec3 w_along;      // median direction: part along the surface, in any space
+    float w_cosine;    // median direction: cosine to its normal
+    float T;           // energy that passes
+    float a;           // spread, as a width
+    float path;        // mean path, in thicknesses
+    float theta;       // scale of the path's distribution
+    float s;           // argument of the baked curves
+    vec3 air_along;    // direction above: part along the surface, in any space
+    float air_cosine;  // direction above: cosine to its normal
 };
 
 const Coat lf_clear_coat = Coat(
@@ -73,8 +80,8 @@ float lf_grazing(float NoW) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec4 w, float tilt) {
-    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+float lf_facet_cosine(FreeDirection w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.cosine * w.cosine));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -83,7 +90,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
@@ -98,23 +105,24 @@ float lf_curve(vec4 low, vec2 high, float s) {
 }
 
 // Follow one direction through the coat's rough top.
-Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w) {
-    float s = lf_grazing(w.w);
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, FreeDirection w) {
+    float s = lf_grazing(w.cosine);
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
     float bend = lf_curve(interface_.bend, interface_.bend_high, s);
-    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
+    float z = sqrt(w.cosine * w.cosine + bend * (2.0 - bend) * dot(w.along, w.along));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
+    return Crossing(w.along * (1.0 - bend), z, T, a, path, theta, s, w.along, w.cosine);
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -125,28 +133,30 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -155,15 +165,16 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     Crossing crossing = lf_pass_interface(lf_clear_coat_interface, lf_clear_coat.eta, lf_clear_coat.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_clear_coat_interface, lf_clear_coat.eta, lf_clear_coat.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_clear_coat.eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_clear_coat.alpha);
+    FreeDirection direction = lf_half_vector(wi, wo);
+    float D = lf_ggx_d(direction, lf_clear_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_clear_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_clear_coat.alpha);
-    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_clear_coat.eta * lf_clear_coat.eta);
     vec3 value = F * (D * V) + throughput * (lf_paint.albedo / 3.1415927) / (1.0 - lf_paint.albedo * lf_paint_returned);
     return lit ? value : vec3(0.0);
@@ -173,7 +184,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

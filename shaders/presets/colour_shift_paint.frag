@@ -37,8 +37,14 @@ struct Conductor {
     float alpha;  // width of the facet slopes; the square of an artist's roughness
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 struct Crossing {
-    vec4 w;             // direction in the medium below
+    vec3 w_along;       // direction in the medium below: part along the surface, in any space
+    float w_cosine;     // direction in the medium below: cosine to its normal
     float T;            // energy that passes
     float spread;       // width of the refracted directions over that of the facets
     float lengthening;  // path beyond that of the refracted direction, in thicknesses
@@ -74,9 +80,10 @@ const Conductor lf_pigment = Conductor(
 );
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -87,28 +94,30 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -117,8 +126,8 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec4 w, float tilt) {
-    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+float lf_facet_cosine(FreeDirection w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.cosine * w.cosine));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -127,7 +136,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
@@ -137,15 +146,16 @@ float lf_with_second_facet(float T, float gain) {
 }
 
 // Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec4 w, float scale, float alpha) {
-    float one_minus = 1.0 - w.w;
+float lf_drift(FreeDirection w, float scale, float alpha) {
+    float one_minus = 1.0 - w.cosine;
     return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec4 lf_refract_about_normal(vec4 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.w * w.w;
-    return vec4(w.xyz, sqrt(z2)) * (1.0 / eta);
+FreeDirection lf_refract_about_normal(FreeDirection w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.cosine * w.cosine;
+    float inverse = 1.0 / eta;
+    return FreeDirection(w.along * inverse, sqrt(z2) * inverse);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
@@ -156,20 +166,20 @@ float lf_slope_spread(float c, float eta) {
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
+Crossing lf_cross(Interface interface_, Coat coat, FreeDirection w, FreeDirection air) {
     float c = lf_facet_cosine(w, interface_.tilt);
     float T = lf_with_second_facet(lf_transmittance_dielectric(c, coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    vec4 below = lf_refract_about_normal(air, interface_.n);
-    return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
+    FreeDirection below = lf_refract_about_normal(air, interface_.n);
+    return Crossing(below.along, below.cosine, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
 // Turn a direction, azimuth kept, until its path 1 / w.z is longer by `lengthening`.
-vec4 lf_steer(vec4 w, float lengthening) {
-    float z = w.w / (1.0 + lengthening * w.w);
-    float growth = lengthening * z * w.w * (w.w + z) / max(dot(w.xyz, w.xyz), 1e-14);
+FreeDirection lf_steer(FreeDirection w, float lengthening) {
+    float z = w.cosine / (1.0 + lengthening * w.cosine);
+    float growth = lengthening * z * w.cosine * (w.cosine + z) / max(dot(w.along, w.along), 1e-14);
     float ratio = sqrt(1.0 + growth);
-    return vec4(w.xyz * ratio, z);
+    return FreeDirection(w.along * ratio, z);
 }
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
@@ -206,31 +216,32 @@ float lf_edge_reflection(float sine, float cosine, float n, float alpha) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_clear_coat.eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_clear_coat.alpha);
+    FreeDirection direction = lf_half_vector(wi, wo);
+    float D = lf_ggx_d(direction, lf_clear_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_clear_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_clear_coat.alpha);
-    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float f = F * (D * V);
     Crossing i = lf_cross(lf_clear_coat_interface, lf_clear_coat, wi, wi);
     Crossing o = lf_cross(lf_clear_coat_interface, lf_clear_coat, wo, wo);
     float throughput = i.T * o.T / (lf_clear_coat.eta * lf_clear_coat.eta);
-    float sin_i = sqrt(dot(wi.xyz, wi.xyz));
-    float sin_o = sqrt(dot(wo.xyz, wo.xyz));
+    float sin_i = sqrt(dot(wi.along, wi.along));
+    float sin_o = sqrt(dot(wo.along, wo.along));
     float R_i = 1.0 - i.T;
     float R_o = 1.0 - o.T;
-    wi = lf_steer(i.w, 0.5 * i.drift);
-    wo = lf_steer(o.w, 0.5 * o.drift);
-    vec4 h = lf_half_vector(wi, wo);
+    wi = lf_steer(FreeDirection(i.w_along, i.w_cosine), 0.5 * i.drift);
+    wo = lf_steer(FreeDirection(o.w_along, o.w_cosine), 0.5 * o.drift);
+    FreeDirection h = lf_half_vector(wi, wo);
     float t = lf_half_cosine(wi, wo);
     vec3 reflected = lf_fresnel_schlick(t, lf_film_on_metal(lf_pigment, t));
     vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
     vec3 F2 = min(max(reflected, 0.0), 1.0) + 0.0025 * (below * below);
     float R = 0.5 * (R_i + R_o);
-    float edge_i = lf_edge_reflection(sin_i, i.w.w, lf_clear_coat_interface.n, lf_pigment.alpha);
-    float edge_o = lf_edge_reflection(sin_o, o.w.w, lf_clear_coat_interface.n, lf_pigment.alpha);
+    float edge_i = lf_edge_reflection(sin_i, i.w_cosine, lf_clear_coat_interface.n, lf_pigment.alpha);
+    float edge_o = lf_edge_reflection(sin_o, o.w_cosine, lf_clear_coat_interface.n, lf_pigment.alpha);
     vec3 q = F2 * (R + (1.0 - R) * (0.5 * (edge_i + edge_o)));
     float spread = (pow(i.spread, 1.34) + pow(o.spread, 1.34)) * pow(lf_clear_coat.alpha, 1.34);
     float total = spread + 3.0 * pow(lf_pigment.alpha, 1.34);
@@ -239,7 +250,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total = spread + 2.0 * pow(lf_pigment.alpha, 1.34);
@@ -248,7 +259,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     total = spread + pow(lf_pigment.alpha, 1.34);
@@ -256,7 +267,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi, width);
     projection_o = lf_ggx_projection(wo, width);
-    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * F2 * lobes;
@@ -267,7 +278,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -12,6 +12,11 @@ struct OrenNayar {
     float sigma;  // standard deviation of the facet angle [rad]
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 const OrenNayar lf_stone = OrenNayar(
     vec3(0.5, 0.37, 0.24),  // albedo: part of the light that is sent back
     0.6                     // sigma: standard deviation of the facet angle [rad]
@@ -31,31 +36,31 @@ float lf_atan2(float y, float x) {
 }
 
 // Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection.
-vec3 lf_oren_nayar_full(vec4 wi, vec4 wo, vec3 albedo, float sigma) {
+vec3 lf_oren_nayar_full(FreeDirection wi, FreeDirection wo, vec3 albedo, float sigma) {
     float sigma2 = sigma * sigma;
     float c1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33);
     float c2 = 0.45 * sigma2 / (sigma2 + 0.09);
     float c3 = 0.125 * sigma2 / (sigma2 + 0.09);
     float c4 = 0.17 * sigma2 / (sigma2 + 0.13);
-    float sin_i = sqrt(dot(wi.xyz, wi.xyz));
-    float sin_o = sqrt(dot(wo.xyz, wo.xyz));
-    float elevation_i = lf_atan2(wi.w, sin_i) * 0.63661975;
-    float elevation_o = lf_atan2(wo.w, sin_o) * 0.63661975;
+    float sin_i = sqrt(dot(wi.along, wi.along));
+    float sin_o = sqrt(dot(wo.along, wo.along));
+    float elevation_i = lf_atan2(wi.cosine, sin_i) * 0.63661975;
+    float elevation_o = lf_atan2(wo.cosine, sin_o) * 0.63661975;
     float higher = max(elevation_i, elevation_o);
-    float lower_cos = min(wi.w, wo.w);
-    float larger_cos = max(wi.w, wo.w);
+    float lower_cos = min(wi.cosine, wo.cosine);
+    float larger_cos = max(wi.cosine, wo.cosine);
     float larger_sin = max(sin_i, sin_o);
-    float dot_xy = dot(wi.xyz, wo.xyz);
+    float dot_xy = dot(wi.along, wo.along);
     float cos_phi = dot_xy / max(sin_i * sin_o, 1e-14);
-    vec3 azimuth_i = wi.xyz / max(sin_i, 1e-14);
-    vec3 azimuth_o = wo.xyz / max(sin_o, 1e-14);
+    vec3 azimuth_i = wi.along / max(sin_i, 1e-14);
+    vec3 azimuth_o = wo.along / max(sin_o, 1e-14);
     bool facing = dot_xy < 0.0;
     vec3 apart = azimuth_i + (facing ? azimuth_o : (-azimuth_o));
     float aside = 0.5 * dot(apart, apart);
     float forward = dot_xy / larger_cos;
     float gap = higher * (3.0 - higher * (3.0 - higher)) - lower_cos * lower_cos / (1.0 + larger_sin);
     float backward = dot_xy * gap / max(larger_cos * larger_sin, 1e-14);
-    float tan_mean = (sin_i + sin_o) / (wi.w + wo.w);
+    float tan_mean = (sin_i + sin_o) / (wi.cosine + wo.cosine);
     float smaller = 1.0 - higher;
     float product = smaller * (1.0 - min(elevation_i, elevation_o));
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
@@ -65,8 +70,8 @@ vec3 lf_oren_nayar_full(vec4 wi, vec4 wo, vec3 albedo, float sigma) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 0.0;
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     vec3 value = lf_oren_nayar_full(wi, wo, lf_stone.albedo, lf_stone.sigma);
     return lit ? value : vec3(0.0);
 }
@@ -75,7 +80,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -45,6 +45,11 @@ struct Crust {
     float scattered;  // scattering of the crust, S times its thickness
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 struct Cover {
     float covered;  // part that is covered
     float bare;     // part that is not: 1 - covered, without the cancellation
@@ -58,7 +63,8 @@ struct Fluence {
 };
 
 struct Crossing {
-    vec4 w;             // direction in the medium below
+    vec3 w_along;       // direction in the medium below: part along the surface, in any space
+    float w_cosine;     // direction in the medium below: cosine to its normal
     float T;            // energy that passes
     float spread;       // width of the refracted directions over that of the facets
     float lengthening;  // path beyond that of the refracted direction, in thicknesses
@@ -245,7 +251,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / max(c + g, 1e-14);
     float parallel = 1.0 / max(eta2 * c + g, 1e-14);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return eta == 1.0 ? 1.0 : passed;
 }
 
@@ -274,13 +280,13 @@ Fluence lf_fluence(vec3 tau, float path) {
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(max(p * p + 4.0 * nk * nk, 1e-24));
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(max(p * p + nk2 * nk2, 1e-24));
+    vec3 larger = sqrt(q + abs(p));
     bvec3 metal = lessThan(p, vec3(0.0));
     vec3 b = mix(vec3(1.0), larger, metal);
-    vec3 twice_abc = mix(larger, nk, metal) * (2.0 * c);
+    vec3 twice_abc = 1.4142135 * mix(larger, nk2, metal) * c;
     vec3 even = b * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = b * (q + c2);
@@ -288,9 +294,10 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -301,28 +308,30 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -331,8 +340,8 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec4 w, float tilt) {
-    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+float lf_facet_cosine(FreeDirection w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.cosine * w.cosine));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -341,20 +350,21 @@ float lf_transmittance_dielectric2(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
 // Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec4 w, float scale, float alpha) {
-    float one_minus = 1.0 - w.w;
+float lf_drift(FreeDirection w, float scale, float alpha) {
+    float one_minus = 1.0 - w.cosine;
     return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec4 lf_refract_about_normal(vec4 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.w * w.w;
-    return vec4(w.xyz, sqrt(z2)) * (1.0 / eta);
+FreeDirection lf_refract_about_normal(FreeDirection w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.cosine * w.cosine;
+    float inverse = 1.0 / eta;
+    return FreeDirection(w.along * inverse, sqrt(z2) * inverse);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
@@ -365,36 +375,36 @@ float lf_slope_spread(float c, float eta) {
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
+Crossing lf_cross(Interface interface_, Coat coat, FreeDirection w, FreeDirection air) {
     float c = lf_facet_cosine(w, interface_.tilt);
     float T = lf_with_second_facet(lf_transmittance_dielectric2(c, coat.eta), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    vec4 below = lf_refract_about_normal(air, interface_.n);
-    return Crossing(below, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
+    FreeDirection below = lf_refract_about_normal(air, interface_.n);
+    return Crossing(below.along, below.cosine, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
 // Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
 vec3 lf_transmittance(vec3 tau, float path) {
-    return exp(-(tau * path));
+    return exp(-tau * path);
 }
 
 // Turn a direction, azimuth kept, until its path 1 / w.z is longer by `lengthening`.
-vec4 lf_steer(vec4 w, float lengthening) {
-    float z = w.w / (1.0 + lengthening * w.w);
-    float growth = lengthening * z * w.w * (w.w + z) / max(dot(w.xyz, w.xyz), 1e-14);
+FreeDirection lf_steer(FreeDirection w, float lengthening) {
+    float z = w.cosine / (1.0 + lengthening * w.cosine);
+    float growth = lengthening * z * w.cosine * (w.cosine + z) / max(dot(w.along, w.along), 1e-14);
     float ratio = sqrt(1.0 + growth);
-    return vec4(w.xyz * ratio, z);
+    return FreeDirection(w.along * ratio, z);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor2(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 twice_abc = nk * (2.0 * c);
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q - p);
+    vec3 twice_abc = 1.4142135 * nk2 * c;
     vec3 even = larger * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = larger * (q + c2);
@@ -459,11 +469,11 @@ TwoFlux lf_kubelka_munk(vec3 Kx, float Sx) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo, vec2 uv) {
     float g = lf_field_at(uv, lf_patina_growth);
     Cover cover = lf_cover_at(g, lf_patina_growth);
     float thickness = lf_thickness_at(g, lf_patina_growth, lf_patina_crust.blur);
-    bool lit = min(wi.w, wo.w) > 1e-07;
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     vec3 t = lf_patina_coat.tau * thickness;
     vec3 t2 = lf_patina_coat.tau_s * thickness;
     vec3 t3 = t + t2;
@@ -564,30 +574,31 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     t18 = 1.0 / max(1.0 - t13 - t15 * t18 - t16 * t20, 1e-06);
     t12 = (t12 - t15 * t6 - t16 * t9) * t18;
     t13 = (t13 - t15 * t7 - t16 * t10) * t18;
-    bool lit2 = min(wi.w, wo.w) > 1e-07;
+    bool lit2 = min(wi.cosine, wo.cosine) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_patina_coat.eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_patina_coat.alpha);
+    FreeDirection direction = lf_half_vector(wi, wo);
+    float D = lf_ggx_d(direction, lf_patina_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_patina_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_patina_coat.alpha);
-    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float f = F * (D * V);
     Crossing i = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wi, wi);
     Crossing o = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wo, wo);
     float throughput = i.T * o.T / (lf_patina_coat.eta * lf_patina_coat.eta);
-    float straight = (i.w.w + o.w.w) / (i.w.w * o.w.w);
+    float straight = (i.w_cosine + o.w_cosine) / (i.w_cosine * o.w_cosine);
     float added = i.lengthening + o.lengthening;
-    float sin_i = sqrt(dot(wi.xyz, wi.xyz));
-    float sin_o = sqrt(dot(wo.xyz, wo.xyz));
+    float sin_i = sqrt(dot(wi.along, wi.along));
+    float sin_o = sqrt(dot(wo.along, wo.along));
     float R_i = 1.0 - i.T;
     float R_o = 1.0 - o.T;
     vec3 directional = lf_transmittance(t + t2, straight + 0.5 * added);
-    vec4 wi2 = lf_steer(i.w, 0.5 * i.drift);
-    vec4 wo2 = lf_steer(o.w, 0.5 * o.drift);
-    vec4 h = lf_half_vector(wi2, wo2);
+    FreeDirection wi2 = lf_steer(FreeDirection(i.w_along, i.w_cosine), 0.5 * i.drift);
+    FreeDirection wo2 = lf_steer(FreeDirection(o.w_along, o.w_cosine), 0.5 * o.drift);
+    FreeDirection h = lf_half_vector(wi2, wo2);
     vec3 F2 = lf_fresnel_conductor2(lf_half_cosine(wi2, wo2), lf_base.eta, lf_base.k);
     float R = 0.5 * (R_i + R_o);
-    float edge_i = lf_edge_reflection(sin_i, i.w.w, lf_patina_interface.n, lf_base.alpha);
-    float edge_o = lf_edge_reflection(sin_o, o.w.w, lf_patina_interface.n, lf_base.alpha);
+    float edge_i = lf_edge_reflection(sin_i, i.w_cosine, lf_patina_interface.n, lf_base.alpha);
+    float edge_o = lf_edge_reflection(sin_o, o.w_cosine, lf_patina_interface.n, lf_base.alpha);
     vec3 q = F2 * directional * (R + (1.0 - R) * (0.5 * (edge_i + edge_o)));
     float spread = (pow(i.spread, 1.34) + pow(o.spread, 1.34)) * pow(lf_patina_coat.alpha, 1.34);
     float total7 = spread + 3.0 * pow(lf_base.alpha, 1.34);
@@ -596,7 +607,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.cosine, wo2.cosine, projection_i, projection_o);
     float lobe = D * V;
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total7 = spread + 2.0 * pow(lf_base.alpha, 1.34);
@@ -605,7 +616,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.cosine, wo2.cosine, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     total7 = spread + pow(lf_base.alpha, 1.34);
@@ -613,33 +624,34 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     D = lf_ggx_d(h, width);
     projection_i = lf_ggx_projection(wi2, width);
     projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.w, wo2.w, projection_i, projection_o);
+    V = lf_v_smith(wi2.cosine, wo2.cosine, projection_i, projection_o);
     lobe = D * V;
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * (F2 * directional) * lobes;
-    float path = 1.0 / i.w.w;
+    float path = 1.0 / i.w_cosine;
     path = path + i.lengthening;
-    float path2 = 1.0 / o.w.w;
+    float path2 = 1.0 / o.w_cosine;
     path2 = path2 + o.lengthening;
     vec3 f3 = lf_once_back(0.07957747, t2, t3, path, path2);
     Fluence beam_i = lf_fluence(t3, path);
     Fluence beam_o = lf_fluence(t3, path2);
-    vec3 up_i = lf_fresnel_conductor2(i.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path);
-    vec3 up_o = lf_fresnel_conductor2(o.w.w, lf_base.eta, lf_base.k) * exp(-t3 * path2);
+    vec3 up_i = lf_fresnel_conductor2(i.w_cosine, lf_base.eta, lf_base.k) * exp(-t3 * path);
+    vec3 up_o = lf_fresnel_conductor2(o.w_cosine, lf_base.eta, lf_base.k) * exp(-t3 * path2);
     vec3 f4 = lf_once_by_mirror(0.07957747, 0.07957747, t2, t3, path, path2, up_i, up_o);
     f3 = f3 + f4;
-    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor2(i.w.w, lf_base.eta, lf_base.k), R_i);
-    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor2(o.w.w, lf_base.eta, lf_base.k), R_o);
+    beam_i = lf_mirrored(beam_i, lf_fresnel_conductor2(i.w_cosine, lf_base.eta, lf_base.k), R_i);
+    beam_o = lf_mirrored(beam_o, lf_fresnel_conductor2(o.w_cosine, lf_base.eta, lf_base.k), R_o);
     f2 = f2 + throughput * (f3 + lf_exchanged(Haze(t3, (t5 - t17 * t8 - t14 * ((t11 - t15 * t5 - t16 * t8) * t18)) * t4, (t6 - t17 * t9 - t14 * t12) * t4, (t7 - t17 * t10 - t14 * t13) * t4, (t9 - t20 * t12) * t4, (t10 - t20 * t13) * t4, t13 * t4), beam_i, beam_o));
     vec3 patina = lit2 ? f2 : vec3(0.0);
     TwoFlux layer = lf_kubelka_munk(lf_patina_crust.absorbed * thickness, lf_patina_crust.scattered * thickness);
     vec3 diffuse = layer.R / 3.1415927;
     patina = patina + diffuse;
     F2 = lf_fresnel_conductor2(lf_half_cosine(wi, wo), lf_base_bare.eta, lf_base_bare.k);
-    D = lf_ggx_d(lf_half_vector(wi, wo), lf_base_bare.alpha);
+    direction = lf_half_vector(wi, wo);
+    D = lf_ggx_d(direction, lf_base_bare.alpha);
     projection_i = lf_ggx_projection(wi, lf_base_bare.alpha);
     projection_o = lf_ggx_projection(wo, lf_base_bare.alpha);
-    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     vec3 bare = F2 * (D * V);
     f2 = cover.bare * bare + cover.covered * patina;
     return lit ? f2 : vec3(0.0);
@@ -649,7 +661,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l, vec2 uv) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV), uv);
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV), uv);
 }
 
 #ifndef LF_LIBRARY

@@ -37,8 +37,14 @@ struct Lambert {
     vec3 albedo;  // part of the light that is sent back
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 struct Crossing {
-    vec4 w;             // direction in the medium below
+    vec3 w_along;       // direction in the medium below: part along the surface, in any space
+    float w_cosine;     // direction in the medium below: cosine to its normal
     vec3 T;             // energy that passes
     float spread;       // width of the refracted directions over that of the facets
     float lengthening;  // path beyond that of the refracted direction, in thicknesses
@@ -77,9 +83,10 @@ const Lambert lf_white = Lambert(
 const vec3 lf_white_returned = vec3(1.4800068, 1.0525558, 1.1574973);
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // The cosine on that side of a dielectric boundary where the index is lower; 0 under total internal reflection.
@@ -114,21 +121,23 @@ vec3 lf_fresnel_schlick(float c, vec3 f0) {
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -137,8 +146,8 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec4 w, float tilt) {
-    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+float lf_facet_cosine(FreeDirection w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.cosine * w.cosine));
 }
 
 // sqrt(c) as -1 to 1, from where a film's polynomial begins.
@@ -166,15 +175,16 @@ vec3 lf_with_second_facet(vec3 T, float gain) {
 }
 
 // Path added near grazing angles, where the facets that face the light take most of it.
-float lf_drift(vec4 w, float scale, float alpha) {
-    float one_minus = 1.0 - w.w;
+float lf_drift(FreeDirection w, float scale, float alpha) {
+    float one_minus = 1.0 - w.cosine;
     return scale * exp(3.16 * log(max(one_minus, 1e-30)) - 7.0 * alpha * one_minus);
 }
 
 // Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection.
-vec4 lf_refract_about_normal(vec4 w, float eta) {
-    float z2 = (eta - 1.0) * (eta + 1.0) + w.w * w.w;
-    return vec4(w.xyz, sqrt(z2)) * (1.0 / eta);
+FreeDirection lf_refract_about_normal(FreeDirection w, float eta) {
+    float z2 = (eta - 1.0) * (eta + 1.0) + w.cosine * w.cosine;
+    float inverse = 1.0 / eta;
+    return FreeDirection(w.along * inverse, sqrt(z2) * inverse);
 }
 
 // Width of the refracted directions over the width of the facets, to first order in slope.
@@ -185,37 +195,38 @@ float lf_slope_spread(float c, float eta) {
 }
 
 // Follow one direction through the rough top of a coat with its relative index; `air` is the direction above all of them.
-Crossing lf_cross(Interface interface_, Coat coat, vec4 w, vec4 air) {
+Crossing lf_cross(Interface interface_, Coat coat, FreeDirection w, FreeDirection air) {
     float c = lf_facet_cosine(w, interface_.tilt);
     vec3 t = lf_film_on_coat2(coat, c);
     vec3 below = 1.0 - min(max(lf_fresnel_schlick(c, t) * 200.0, 0.0), 1.0);
     vec3 T = lf_with_second_facet(min(max((1.0 - t) * (c * (5.0 - c * (10.0 - c * (10.0 - c * (5.0 - c))))), 0.0), 1.0) - 0.0025 * (below * below), interface_.gain);
     float grazing = lf_drift(w, interface_.drift, interface_.alpha);
-    vec4 below2 = lf_refract_about_normal(air, interface_.n);
-    return Crossing(below2, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
+    FreeDirection below2 = lf_refract_about_normal(air, interface_.n);
+    return Crossing(below2.along, below2.cosine, T, lf_slope_spread(c, coat.eta), interface_.lengthening + grazing, grazing);
 }
 
 // Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
 vec3 lf_transmittance(vec3 tau, float path) {
-    return exp(-(tau * path));
+    return exp(-tau * path);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     float c = lf_rarer_cosine(lf_half_cosine(wi, wo), lf_lacquer.eta);
     vec3 reflected = lf_fresnel_schlick(c, lf_film_on_coat(lf_lacquer, c));
     vec3 below = 1.0 - min(max(reflected * 200.0, 0.0), 1.0);
     vec3 F = min(max(reflected, 0.0), 1.0) + 0.0025 * (below * below);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_lacquer.alpha);
+    FreeDirection direction = lf_half_vector(wi, wo);
+    float D = lf_ggx_d(direction, lf_lacquer.alpha);
     float projection_i = lf_ggx_projection(wi, lf_lacquer.alpha);
     float projection_o = lf_ggx_projection(wo, lf_lacquer.alpha);
-    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     vec3 f = F * (D * V);
     Crossing i = lf_cross(lf_lacquer_interface, lf_lacquer, wi, wi);
     Crossing o = lf_cross(lf_lacquer_interface, lf_lacquer, wo, wo);
     vec3 throughput = i.T * o.T / (lf_lacquer.eta * lf_lacquer.eta);
-    float straight = (i.w.w + o.w.w) / (i.w.w * o.w.w);
+    float straight = (i.w_cosine + o.w_cosine) / (i.w_cosine * o.w_cosine);
     float added = i.lengthening + o.lengthening;
     vec3 diffuse = lf_transmittance(lf_lacquer.tau, straight + added);
     reflected = lf_white.albedo / 3.1415927 * lf_white_returned;
@@ -227,7 +238,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -36,6 +36,11 @@ struct Conductor {
     vec3 k;       // index of refraction, imaginary part
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 struct Cover {
     float covered;  // part that is covered
     float bare;     // part that is not: 1 - covered, without the cancellation
@@ -190,9 +195,10 @@ vec3 lf_kubelka_munk_over2(TwoFlux layer, vec3 substrate) {
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -204,29 +210,31 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     float value = refracts ? reflectance : 1.0;
     return eta == 1.0 ? 0.0 : value;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(max(a2 + (1.0 - a2) * (w.w * w.w), 0.0));
+    return sqrt(max(a2 + (1.0 - a2) * (w.cosine * w.cosine), 0.0));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -240,13 +248,13 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / max(eta2 * c + g, 1e-14);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return eta == 1.0 ? 1.0 : passed;
 }
 
 // BRDF [1/sr] of a diffuse body of this albedo below a smooth boundary (Saunderson 1942, per direction).
-vec3 lf_below_boundary(vec4 wi, vec4 wo, float eta, float escape, vec3 albedo) {
-    float T = lf_transmittance_dielectric(wi.w, eta) * lf_transmittance_dielectric(wo.w, eta);
+vec3 lf_below_boundary(FreeDirection wi, FreeDirection wo, float eta, float escape, vec3 albedo) {
+    float T = lf_transmittance_dielectric(wi.cosine, eta) * lf_transmittance_dielectric(wo.cosine, eta);
     vec3 kept = max(1.0 - albedo + albedo * escape, 1e-06);
     return T / (eta * eta) * (albedo / 3.1415927) / kept;
 }
@@ -255,11 +263,11 @@ vec3 lf_below_boundary(vec4 wi, vec4 wo, float eta, float escape, vec3 albedo) {
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 twice_abc = nk * (2.0 * c);
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q - p);
+    vec3 twice_abc = 1.4142135 * nk2 * c;
     vec3 even = larger * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = larger * (q + c2);
@@ -267,9 +275,9 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection2(vec4 w, float alpha) {
+float lf_ggx_projection2(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -278,9 +286,9 @@ float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) 
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo, vec2 uv) {
     Cover cover = lf_cover_at(lf_field_at(uv, lf_verdigris_growth), lf_verdigris_growth);
-    bool lit = min(wi.w, wo.w) > 1e-07;
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     float t = cover.covered * lf_verdigris_pigment.thickness;
     float through = lf_see_through(t);
     float share = 1.0 - through;
@@ -306,17 +314,19 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
     layer = lf_kubelka_munk2(lf_verdigris_pigment.K * thickness2, lf_verdigris_pigment.S * thickness2);
     albedo = lf_kubelka_munk_over2(layer, albedo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), alpha);
+    FreeDirection direction = lf_half_vector(wi, wo);
+    float D = lf_ggx_d(direction, alpha);
     float projection_i = lf_ggx_projection(wi, alpha);
     float projection_o = lf_ggx_projection(wo, alpha);
-    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float boundary = F * (D * V);
     vec3 body = lf_below_boundary(wi, wo, eta, escape, albedo);
     vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_brass.eta, lf_brass.k);
-    D = lf_ggx_d(lf_half_vector(wi, wo), lf_brass.alpha);
+    direction = lf_half_vector(wi, wo);
+    D = lf_ggx_d(direction, lf_brass.alpha);
     projection_i = lf_ggx_projection2(wi, lf_brass.alpha);
     projection_o = lf_ggx_projection2(wo, lf_brass.alpha);
-    V = lf_v_smith2(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith2(wi.cosine, wo.cosine, projection_i, projection_o);
     vec3 metal = F2 * (D * V);
     vec3 f = covered * (boundary + body) + bare * metal;
     return lit ? f : vec3(0.0);
@@ -326,7 +336,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l, vec2 uv) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV), uv);
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV), uv);
 }
 
 #ifndef LF_LIBRARY

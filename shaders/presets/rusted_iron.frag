@@ -31,6 +31,11 @@ struct Conductor {
     vec3 k;       // index of refraction, imaginary part
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 struct Cover {
     float covered;  // part that is covered
     float bare;     // part that is not: 1 - covered, without the cancellation
@@ -157,9 +162,10 @@ vec3 lf_kubelka_munk_over(TwoFlux layer, vec3 substrate) {
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -170,28 +176,30 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -205,13 +213,13 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
 // BRDF [1/sr] of a diffuse body of this albedo below a smooth boundary (Saunderson 1942, per direction).
-vec3 lf_below_boundary(vec4 wi, vec4 wo, float eta, float escape, vec3 albedo) {
-    float T = lf_transmittance_dielectric(wi.w, eta) * lf_transmittance_dielectric(wo.w, eta);
+vec3 lf_below_boundary(FreeDirection wi, FreeDirection wo, float eta, float escape, vec3 albedo) {
+    float T = lf_transmittance_dielectric(wi.cosine, eta) * lf_transmittance_dielectric(wo.cosine, eta);
     vec3 kept = max(1.0 - albedo + albedo * escape, 1e-06);
     return T / (eta * eta) * (albedo / 3.1415927) / kept;
 }
@@ -220,13 +228,13 @@ vec3 lf_below_boundary(vec4 wi, vec4 wo, float eta, float escape, vec3 albedo) {
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + abs(p)));
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q + abs(p));
     bvec3 metal = lessThan(p, vec3(0.0));
     vec3 b = mix(vec3(1.0), larger, metal);
-    vec3 twice_abc = mix(larger, nk, metal) * (2.0 * c);
+    vec3 twice_abc = 1.4142135 * mix(larger, nk2, metal) * c;
     vec3 even = b * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = b * (q + c2);
@@ -234,26 +242,28 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo, vec2 uv) {
     Cover cover = lf_cover_at(lf_field_at(uv, lf_rust_growth), lf_rust_growth);
-    bool lit = min(wi.w, wo.w) > 1e-07;
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     float t = cover.covered * lf_rust_pigment.thickness;
     float through = lf_see_through(t);
     float share = 1.0 - through;
     TwoFlux layer = lf_kubelka_munk(lf_rust_pigment.K * t, lf_rust_pigment.S * t);
     vec3 albedo = lf_kubelka_munk_over(layer, lf_iron_albedo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_rust_pigment.eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_rust_pigment.alpha);
+    FreeDirection direction = lf_half_vector(wi, wo);
+    float D = lf_ggx_d(direction, lf_rust_pigment.alpha);
     float projection_i = lf_ggx_projection(wi, lf_rust_pigment.alpha);
     float projection_o = lf_ggx_projection(wo, lf_rust_pigment.alpha);
-    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float boundary = F * (D * V);
     vec3 body = lf_below_boundary(wi, wo, lf_rust_pigment.eta, lf_rust_pigment.escape, albedo);
     vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_iron.eta, lf_iron.k);
-    D = lf_ggx_d(lf_half_vector(wi, wo), lf_iron.alpha);
+    direction = lf_half_vector(wi, wo);
+    D = lf_ggx_d(direction, lf_iron.alpha);
     projection_i = lf_ggx_projection(wi, lf_iron.alpha);
     projection_o = lf_ggx_projection(wo, lf_iron.alpha);
-    V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     vec3 metal = F2 * (D * V);
     vec3 f = share * (boundary + body) + through * metal;
     return lit ? f : vec3(0.0);
@@ -263,7 +273,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo, vec2 uv) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l, vec2 uv) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV), uv);
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV), uv);
 }
 
 #ifndef LF_LIBRARY

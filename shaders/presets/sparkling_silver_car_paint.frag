@@ -120,7 +120,8 @@ float lf_lost_variance(float distance, float half_distance) {
 // The unit vector halfway between two directions on the same side of the surface.
 vec3 lf_half_vector(vec3 wi, vec3 wo) {
     vec3 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+    float inverse = inversesqrt(dot(s, s));
+    return s * inverse;
 }
 
 // The cosine between either direction and their half vector.

@@ -33,14 +33,21 @@ struct OrenNayar {
     float sigma;  // standard deviation of the facet angle [rad]
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 struct Crossing {
-    vec4 w;       // median direction
-    float T;      // energy that passes
-    float a;      // spread, as a width
-    float path;   // mean path, in thicknesses
-    float theta;  // scale of the path's distribution
-    float s;      // argument of the baked curves
-    vec4 air;     // direction above
+    vec3 w_along;      // median direction: part along the surface, in any space
+    float w_cosine;    // median direction: cosine to its normal
+    float T;           // energy that passes
+    float a;           // spread, as a width
+    float path;        // mean path, in thicknesses
+    float theta;       // scale of the path's distribution
+    float s;           // argument of the baked curves
+    vec3 air_along;    // direction above: part along the surface, in any space
+    float air_cosine;  // direction above: cosine to its normal
 };
 
 const Coat lf_varnish = Coat(
@@ -90,8 +97,8 @@ float lf_grazing(float NoW) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec4 w, float tilt) {
-    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+float lf_facet_cosine(FreeDirection w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.cosine * w.cosine));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -100,7 +107,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
@@ -115,23 +122,24 @@ float lf_curve(vec4 low, vec2 high, float s) {
 }
 
 // Follow one direction through the coat's rough top.
-Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w) {
-    float s = lf_grazing(w.w);
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, FreeDirection w) {
+    float s = lf_grazing(w.cosine);
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
     float bend = lf_curve(interface_.bend, interface_.bend_high, s);
-    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
+    float z = sqrt(w.cosine * w.cosine + bend * (2.0 - bend) * dot(w.along, w.along));
     float a = max(lf_curve(interface_.spread, interface_.spread_high, s), 0.0) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
+    return Crossing(w.along * (1.0 - bend), z, T, a, path, theta, s, w.along, w.cosine);
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -142,28 +150,30 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -177,31 +187,31 @@ vec3 lf_spread_root(float theta, vec3 tau) {
 }
 
 // Oren and Nayar 1994, eqs. 25 to 29: diffuse grooves with one interreflection.
-vec3 lf_oren_nayar_full(vec4 wi, vec4 wo, vec3 albedo, float sigma) {
+vec3 lf_oren_nayar_full(FreeDirection wi, FreeDirection wo, vec3 albedo, float sigma) {
     float sigma2 = sigma * sigma;
     float c1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33);
     float c2 = 0.45 * sigma2 / (sigma2 + 0.09);
     float c3 = 0.125 * sigma2 / (sigma2 + 0.09);
     float c4 = 0.17 * sigma2 / (sigma2 + 0.13);
-    float sin_i = sqrt(dot(wi.xyz, wi.xyz));
-    float sin_o = sqrt(dot(wo.xyz, wo.xyz));
-    float elevation_i = lf_atan2(wi.w, sin_i) * 0.63661975;
-    float elevation_o = lf_atan2(wo.w, sin_o) * 0.63661975;
+    float sin_i = sqrt(dot(wi.along, wi.along));
+    float sin_o = sqrt(dot(wo.along, wo.along));
+    float elevation_i = lf_atan2(wi.cosine, sin_i) * 0.63661975;
+    float elevation_o = lf_atan2(wo.cosine, sin_o) * 0.63661975;
     float higher = max(elevation_i, elevation_o);
-    float lower_cos = min(wi.w, wo.w);
-    float larger_cos = max(wi.w, wo.w);
+    float lower_cos = min(wi.cosine, wo.cosine);
+    float larger_cos = max(wi.cosine, wo.cosine);
     float larger_sin = max(sin_i, sin_o);
-    float dot_xy = dot(wi.xyz, wo.xyz);
+    float dot_xy = dot(wi.along, wo.along);
     float cos_phi = dot_xy / max(sin_i * sin_o, 1e-14);
-    vec3 azimuth_i = wi.xyz / max(sin_i, 1e-14);
-    vec3 azimuth_o = wo.xyz / max(sin_o, 1e-14);
+    vec3 azimuth_i = wi.along / max(sin_i, 1e-14);
+    vec3 azimuth_o = wo.along / max(sin_o, 1e-14);
     bool facing = dot_xy < 0.0;
     vec3 apart = azimuth_i + (facing ? azimuth_o : (-azimuth_o));
     float aside = 0.5 * dot(apart, apart);
     float forward = dot_xy / larger_cos;
     float gap = higher * (3.0 - higher * (3.0 - higher)) - lower_cos * lower_cos / (1.0 + larger_sin);
     float backward = dot_xy * gap / max(larger_cos * larger_sin, 1e-14);
-    float tan_mean = (sin_i + sin_o) / (wi.w + wo.w);
+    float tan_mean = (sin_i + sin_o) / (wi.cosine + wo.cosine);
     float smaller = 1.0 - higher;
     float product = smaller * (1.0 - min(elevation_i, elevation_o));
     float direct = c1 + c2 * (dot_xy >= 0.0 ? forward : backward);
@@ -211,19 +221,20 @@ vec3 lf_oren_nayar_full(vec4 wi, vec4 wo, vec3 albedo, float sigma) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     Crossing crossing = lf_pass_interface(lf_varnish_interface, lf_varnish.eta, lf_varnish.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_varnish_interface, lf_varnish.eta, lf_varnish.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_varnish.eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_varnish.alpha);
+    FreeDirection direction = lf_half_vector(wi, wo);
+    float D = lf_ggx_d(direction, lf_varnish.alpha);
     float projection_i = lf_ggx_projection(wi, lf_varnish.alpha);
     float projection_o = lf_ggx_projection(wo, lf_varnish.alpha);
-    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_varnish.eta * lf_varnish.eta);
     vec3 once = lf_varnish.tau + (crossing.path - 1.0) * (2.0 * lf_varnish.tau / (1.0 + lf_spread_root(crossing.theta, lf_varnish.tau)));
     vec3 throughput2 = throughput * exp(-(once + (lf_varnish.tau + (crossing2.path - 1.0) * (2.0 * lf_varnish.tau / (1.0 + lf_spread_root(crossing2.theta, lf_varnish.tau))))));
-    vec3 value = F * (D * V) + throughput2 * lf_oren_nayar_full(crossing.w, crossing2.w, lf_wood.albedo, lf_wood.sigma) / (1.0 - lf_wood.albedo * lf_wood_returned);
+    vec3 value = F * (D * V) + throughput2 * lf_oren_nayar_full(FreeDirection(crossing.w_along, crossing.w_cosine), FreeDirection(crossing2.w_along, crossing2.w_cosine), lf_wood.albedo, lf_wood.sigma) / (1.0 - lf_wood.albedo * lf_wood_returned);
     return lit ? value : vec3(0.0);
 }
 
@@ -231,7 +242,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -13,6 +13,11 @@ struct Blinn {
     float exponent;  // exponent of the cosine; large is narrow
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 const Blinn lf_base = Blinn(
     vec3(0.5, 0.28, 0.13),  // kd: diffuse part
     0.1,                    // ks: strength of the lobe
@@ -33,14 +38,16 @@ vec3 lf_log1p(vec3 x) {
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // 1 - NoH, without the cancellation near the normal.
-float lf_normal_distance(vec4 h) {
-    return dot(h.xyz, h.xyz) / (1.0 + h.w);
+float lf_normal_distance(FreeDirection h) {
+    return dot(h.along, h.along) / (1.0 + h.cosine);
 }
 
 // cos^exponent of an angle by 1 - cos, which keeps the digits of narrow lobes; 0 from a right angle on.
@@ -51,9 +58,9 @@ float lf_cosine_power(float one_minus, float exponent) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
-    vec4 h = lf_half_vector(wi, wo);
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
+    FreeDirection h = lf_half_vector(wi, wo);
     float power = lf_cosine_power(lf_normal_distance(h), lf_base.exponent);
     vec3 value = lf_base.ks * ((lf_base.exponent + 8.0) * 0.039788734 * power) + lf_base.kd / 3.1415927;
     return lit ? value : vec3(0.0);
@@ -63,7 +70,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -20,6 +20,11 @@ struct Conductor {
     vec3 k;       // index of refraction, imaginary part
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 const Coat lf_coat = Coat(
     0.1,                   // alpha: width of the facet slopes; the square of an artist's roughness
     1.5,                   // eta: index of refraction, against air
@@ -33,15 +38,18 @@ const Conductor lf_base = Conductor(
 );
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -52,23 +60,24 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10).
-float lf_v_cavity(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float NoH_over_c = 2.0 * s.w / dot(s, s);
-    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(wi.w, wo.w));
+float lf_v_cavity(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float NoH_over_c = 2.0 * cosine / (dot(along, along) + cosine * cosine);
+    return min(0.25 / max(wi.cosine * wo.cosine, 1e-14), 0.5 * NoH_over_c / max(wi.cosine, wo.cosine));
 }
 
 // Cosine below a boundary of relative index `eta` (Snell's law); 0 under total internal reflection.
@@ -77,9 +86,12 @@ float lf_cosine_below(float c, float eta) {
 }
 
 // Direction below a facet with normal `h`, c = w.h (Elek 2010 after Weidlich and Wilkie 2007); z may be <= 0.
-vec4 lf_refract_about_facet(vec4 w, vec4 h, float c, float c_below, float eta) {
+FreeDirection lf_refract_about_facet(FreeDirection w, FreeDirection h, float c, float c_below, float eta) {
     float inverse = 1.0 / eta;
-    return w * inverse + (c_below - c * inverse) * h;
+    float turn = c_below - c * inverse;
+    vec3 along = w.along * inverse + h.along * turn;
+    float cosine = w.cosine * inverse + h.cosine * turn;
+    return FreeDirection(along, cosine);
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -88,7 +100,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
@@ -96,11 +108,11 @@ float lf_transmittance_dielectric(float c, float eta) {
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 twice_abc = nk * (2.0 * c);
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q - p);
+    vec3 twice_abc = 1.4142135 * nk2 * c;
     vec3 even = larger * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = larger * (q + c2);
@@ -108,9 +120,9 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -120,42 +132,41 @@ float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
 
 // Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
 vec3 lf_transmittance(vec3 tau, float path) {
-    return exp(-(tau * path));
+    return exp(-tau * path);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
-    vec4 h = lf_half_vector(wi, wo);
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
+    FreeDirection h = lf_half_vector(wi, wo);
     float c = lf_half_cosine(wi, wo);
     float F = lf_fresnel_dielectric(c, lf_coat.eta);
     float D = lf_ggx_d(h, lf_coat.alpha);
     float V = lf_v_cavity(wi, wo);
-    float top = F * D * V;
-    float G = 4.0 * V * wi.w * wo.w;
+    float top = F * V * D;
     float c_below = lf_cosine_below(c, lf_coat.eta);
-    vec4 wi_below = lf_refract_about_facet(wi, h, c, c_below, lf_coat.eta);
-    vec4 wo_below = lf_refract_about_facet(wo, h, c, c_below, lf_coat.eta);
+    FreeDirection wi_below = lf_refract_about_facet(wi, h, c, c_below, lf_coat.eta);
+    FreeDirection wo_below = lf_refract_about_facet(wo, h, c, c_below, lf_coat.eta);
     float T12 = lf_transmittance_dielectric(c, lf_coat.eta);
-    float t = 1.0 - G * F;
-    bool lit2 = min(wi_below.w, wo_below.w) > 1e-07;
+    float t = 1.0 - 4.0 * wi.cosine * (F * V * wo.cosine);
+    bool lit2 = min(wi_below.cosine, wo_below.cosine) > 1e-07;
     D = lf_ggx_d(h, lf_base.alpha);
     float projection_i = lf_ggx_projection(wi_below, lf_base.alpha);
     float projection_o = lf_ggx_projection(wo_below, lf_base.alpha);
-    V = lf_v_smith(wi_below.w, wo_below.w, projection_i, projection_o);
-    vec3 value = lf_fresnel_conductor(c_below, lf_base.eta, lf_base.k) * (D * V);
-    vec3 rest = T12 * t * (lit2 ? value : vec3(0.0));
-    float path = (wi_below.w + wo_below.w) / max(wi_below.w * wo_below.w, 1e-14);
+    V = lf_v_smith(wi_below.cosine, wo_below.cosine, projection_i, projection_o);
+    vec3 rest = T12 * t * (lf_fresnel_conductor(c_below, lf_base.eta, lf_base.k) * (D * V));
+    float path = (wi_below.cosine + wo_below.cosine) / (wi_below.cosine * wo_below.cosine);
     rest = rest * lf_transmittance(lf_coat.tau, path);
-    vec3 f = top + rest;
-    return lit ? f : vec3(0.0);
+    vec3 value = top + rest;
+    value = lit2 ? value : vec3(top);
+    return lit ? value : vec3(0.0);
 }
 
 // BRDF [1/sr] in any frame: an isotropic surface asks for no tangent.
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -15,6 +15,11 @@ struct Lafortune {
     float exponent;  // exponent of the lobe; large is narrow
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 const Lafortune lf_base = Lafortune(
     vec3(0.5, 0.28, 0.13),  // kd: diffuse part
     0.6,                    // ks: strength of the lobe [1/sr]
@@ -37,11 +42,13 @@ vec3 lf_log1p(vec3 x) {
 }
 
 // log(Cx wi.x wo.x + Cy wi.y wo.y + Cz wi.z wo.z), which is 0 at the peak of Phong's lobe; -1e4 where there is none.
-float lf_lafortune_log_product(vec4 wi, vec4 wo, vec3 C) {
+float lf_lafortune_log_product(FreeDirection wi, FreeDirection wo, vec3 C) {
+    vec4 wi2 = vec4(wi.along, wi.cosine);
+    vec4 wo2 = vec4(wo.along, wo.cosine);
     vec4 C2 = vec4(C.x, C);
     vec4 magnitude = abs(C2);
-    vec4 apart = wi - sign(C2) * wo;
-    vec4 above_one = 0.5 * ((magnitude - 1.0) * (wi * wi + wo * wo) - magnitude * (apart * apart));
+    vec4 apart = wi2 - sign(C2) * wo2;
+    vec4 above_one = 0.5 * ((magnitude - 1.0) * (wi2 * wi2 + wo2 * wo2) - magnitude * (apart * apart));
     float product = dot(above_one, vec4(1.0));
     bool inside = product > (-0.999999);
     float value = lf_log1p(inside ? product : 0.0);
@@ -49,8 +56,8 @@ float lf_lafortune_log_product(vec4 wi, vec4 wo, vec3 C) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     float log_product = lf_lafortune_log_product(wi, wo, vec3(lf_base.cx, lf_base.cx, lf_base.cz));
     vec3 value = lf_base.ks * exp(min(lf_base.exponent * log_product, 60.0)) + lf_base.kd / 3.1415927;
     return lit ? value : vec3(0.0);
@@ -60,7 +67,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -13,6 +13,11 @@ struct Phong {
     float exponent;  // exponent of the cosine; large is narrow
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 const Phong lf_base = Phong(
     vec3(0.5, 0.28, 0.13),  // kd: diffuse part
     0.1,                    // ks: strength of the lobe
@@ -33,9 +38,9 @@ vec3 lf_log1p(vec3 x) {
 }
 
 // 1 - cos of the angle between `wo` and the mirror direction of `wi`: half of a squared distance.
-float lf_mirror_distance(vec4 wi, vec4 wo) {
-    vec3 lean = wi.xyz + wo.xyz;
-    float z = wi.w - wo.w;
+float lf_mirror_distance(FreeDirection wi, FreeDirection wo) {
+    vec3 lean = wi.along + wo.along;
+    float z = wi.cosine - wo.cosine;
     return 0.5 * (dot(lean, lean) + z * z);
 }
 
@@ -47,8 +52,8 @@ float lf_cosine_power(float one_minus, float exponent) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     float power = lf_cosine_power(lf_mirror_distance(wi, wo), lf_base.exponent);
     vec3 value = lf_base.ks * ((lf_base.exponent + 2.0) * 0.15915494 * power) + lf_base.kd / 3.1415927;
     return lit ? value : vec3(0.0);
@@ -58,7 +63,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

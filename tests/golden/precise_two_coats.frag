@@ -44,14 +44,21 @@ struct Conductor {
     vec3 k;       // index of refraction, imaginary part
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 struct Crossing {
-    vec4 w;       // median direction
-    float T;      // energy that passes
-    float a;      // spread, as a width
-    float path;   // mean path, in thicknesses
-    float theta;  // scale of the path's distribution
-    float s;      // argument of the baked curves
-    vec4 air;     // direction above
+    vec3 w_along;      // median direction: part along the surface, in any space
+    float w_cosine;    // median direction: cosine to its normal
+    float T;           // energy that passes
+    float a;           // spread, as a width
+    float path;        // mean path, in thicknesses
+    float theta;       // scale of the path's distribution
+    float s;           // argument of the baked curves
+    vec3 air_along;    // direction above: part along the surface, in any space
+    float air_cosine;  // direction above: cosine to its normal
 };
 
 struct Shares {
@@ -112,21 +119,21 @@ const Curve lf_coat_passed = Curve(
 );
 
 const Curve lf_coat_inner_again = Curve(
-    vec3(0.6817515, 0.48762596, 0.24483591),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.17641434, -0.09085984, -0.032956827),    // c1: 
-    vec3(0.008886725, 0.017605133, 0.013391763),     // c2: 
-    vec3(-0.029954284, 0.00023138523, 0.023642972),  // c3: 
-    vec3(-0.10627872, -0.09002198, -0.049215175),    // c4: 
-    vec3(-0.06558031, -0.077980876, -0.054472446)    // c5: 
+    vec3(0.6817515, 0.48762587, 0.2448359),         // c0: coefficients of the powers of the curves' argument
+    vec3(-0.1764141, -0.09085945, -0.032956876),    // c1: 
+    vec3(0.008886799, 0.017605416, 0.0133918),      // c2: 
+    vec3(-0.029955447, 0.00023061037, 0.02364339),  // c3: 
+    vec3(-0.10627888, -0.09002204, -0.04921511),    // c4: 
+    vec3(-0.06557995, -0.07798052, -0.054473057)    // c5: 
 );
 
 const Curve lf_coat_inner_rest = Curve(
-    vec3(0.091247536, 0.074555315, 0.049194414),       // c0: coefficients of the powers of the curves' argument
-    vec3(-0.018326074, -0.012940391, -0.0070063677),   // c1: 
-    vec3(-1.1052936e-05, 0.001524169, 0.0011310391),   // c2: 
-    vec3(-0.013046004, -0.006888654, -0.0021451935),   // c3: 
-    vec3(-0.011748537, -0.012056703, -0.008981697),    // c4: 
-    vec3(-0.0020795166, -0.006252013, -0.0061957054)   // c5: 
+    vec3(0.09124752, 0.07455532, 0.049194407),          // c0: coefficients of the powers of the curves' argument
+    vec3(-0.01832604, -0.012940375, -0.0070063383),     // c1: 
+    vec3(-1.104176e-05, 0.0015241578, 0.0011310587),    // c2: 
+    vec3(-0.013046138, -0.0068887547, -0.0021453463),   // c3: 
+    vec3(-0.011748575, -0.012056671, -0.008981725),     // c4: 
+    vec3(-0.0020794198, -0.0062519647, -0.0061956234)   // c5: 
 );
 
 const Conductor lf_base = Conductor(
@@ -136,27 +143,28 @@ const Conductor lf_base = Conductor(
 );
 
 const Curve lf_coat_again = Curve(
-    vec3(0.33393088, 0.43529066, 0.29938802),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.024904296, -0.035087094, -0.031151395),  // c1: 
-    vec3(0.031484477, 0.028581798, 0.016576521),     // c2: 
-    vec3(0.051282495, 0.029459119, 0.015581727),     // c3: 
-    vec3(-0.07091175, -0.07764073, -0.052618027),    // c4: 
-    vec3(-0.07806277, -0.07196075, -0.048757315)     // c5: 
+    vec3(0.33393097, 0.43529072, 0.29938802),      // c0: coefficients of the powers of the curves' argument
+    vec3(-0.02490455, -0.035086893, -0.03115135),  // c1: 
+    vec3(0.03148394, 0.028581262, 0.016576536),    // c2: 
+    vec3(0.05128321, 0.029458433, 0.015581578),    // c3: 
+    vec3(-0.07091133, -0.077640295, -0.05261801),  // c4: 
+    vec3(-0.07806319, -0.07196039, -0.048757136)   // c5: 
 );
 
 const Curve lf_coat_rest = Curve(
-    vec3(0.47854635, 0.3720594, 0.23941283),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.01089371, -0.015971087, -0.021451086),    // c1: 
-    vec3(0.025650427, 0.007946163, 0.0048397332),     // c2: 
-    vec3(0.0055757165, -0.01969564, -0.0003053546),   // c3: 
-    vec3(-0.055335283, -0.028815478, -0.023669548),   // c4: 
-    vec3(-0.041610956, -0.0074114203, -0.018223554)   // c5: 
+    vec3(0.4785465, 0.3720594, 0.23941284),           // c0: coefficients of the powers of the curves' argument
+    vec3(-0.010893583, -0.01597108, -0.02145093),     // c1: 
+    vec3(0.02564989, 0.007945567, 0.0048398003),      // c2: 
+    vec3(0.0055748224, -0.01969561, -0.00030621886),  // c3: 
+    vec3(-0.055334806, -0.028814808, -0.023669533),   // c4: 
+    vec3(-0.04161048, -0.0074115694, -0.018222988)    // c5: 
 );
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a dielectric boundary (Born and Wolf 1999, 1.5.2); 1 under total internal reflection.
@@ -167,28 +175,30 @@ float lf_fresnel_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float rs = delta * (perpendicular * perpendicular);
-    float rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
-    float reflectance = 0.5 * (rs * rs + rp * rp);
+    float rs = perpendicular * perpendicular;
+    float rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel);
+    float reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp);
     return reflectance;
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec4 h, float alpha) {
-    float root = alpha / (dot(h.xyz, h.xyz) + alpha * alpha * (h.w * h.w));
-    return root * root * 0.31830987;
+float lf_ggx_d(FreeDirection h, float alpha) {
+    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
+    return root * root;
 }
 
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
-float lf_ggx_projection(vec4 w, float alpha) {
+float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
-    return sqrt(a2 + (1.0 - a2) * (w.w * w.w));
+    return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
@@ -202,8 +212,8 @@ float lf_grazing(float NoW) {
 }
 
 // Cosine between a direction and the facets that it meets.
-float lf_facet_cosine(vec4 w, float tilt) {
-    return sqrt(tilt + (1.0 - tilt) * (w.w * w.w));
+float lf_facet_cosine(FreeDirection w, float tilt) {
+    return sqrt(tilt + (1.0 - tilt) * (w.cosine * w.cosine));
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -212,7 +222,7 @@ float lf_transmittance_dielectric(float c, float eta) {
     float eta2 = eta * eta;
     float perpendicular = 1.0 / (c + g);
     float parallel = 1.0 / (eta2 * c + g);
-    float passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel));
+    float passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel));
     return passed;
 }
 
@@ -227,17 +237,17 @@ float lf_curve(vec4 low, vec2 high, float s) {
 }
 
 // Follow one direction through the coat's rough top.
-Crossing lf_pass_interface(Interface interface_, float eta, float alpha, vec4 w) {
-    float s = lf_grazing(w.w);
+Crossing lf_pass_interface(Interface interface_, float eta, float alpha, FreeDirection w) {
+    float s = lf_grazing(w.cosine);
     float T = lf_with_second_facet(lf_transmittance_dielectric(lf_facet_cosine(w, interface_.tilt), eta), interface_.gain);
     T = max(T + lf_curve(interface_.passed, interface_.passed_high, s), 0.0);
     T = min(T, 1.0);
     float bend = lf_curve(interface_.bend, interface_.bend_high, s);
-    float z = sqrt(w.w * w.w + bend * (2.0 - bend) * dot(w.xyz, w.xyz));
+    float z = sqrt(w.cosine * w.cosine + bend * (2.0 - bend) * dot(w.along, w.along));
     float a = lf_curve(interface_.spread, interface_.spread_high, s) * alpha;
     float path = max(lf_curve(interface_.path, interface_.path_high, s), 1.0) / z;
     float theta = max(lf_curve(interface_.theta, interface_.theta_high, s), 0.0);
-    return Crossing(vec4(w.xyz * (1.0 - bend), z), T, a, path, theta, s, w);
+    return Crossing(w.along * (1.0 - bend), z, T, a, path, theta, s, w.along, w.cosine);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -252,31 +262,31 @@ vec3 lf_amount(Curve curve, float s) {
 
 // What the width of a lobe is due to.
 Shares lf_split(Crossing i, Crossing o, float alpha) {
-    float base = alpha * (i.w.w + o.w.w);
+    float base = alpha * (i.w_cosine + o.w_cosine);
     float inverse = 1.0 / (base + i.a + o.a);
     return Shares(base * inverse, i.a * inverse, o.a * inverse);
 }
 
 // The direction of one crossing, turned by its share of the tilt that the facets of the base would need alone.
-vec4 lf_lean(Crossing x, Crossing i, Crossing o, float share) {
-    vec3 turn = 0.8241 * share * (i.w.xyz + o.w.xyz);
-    float z2 = x.w.w * x.w.w;
-    z2 = max(z2 + dot(turn, 2.0 * x.w.xyz - turn), min(z2, 0.0004));
-    return vec4(x.w.xyz - turn, sqrt(z2));
+FreeDirection lf_lean(Crossing x, Crossing i, Crossing o, float share) {
+    vec3 turn = 0.8241 * share * (i.w_along + o.w_along);
+    float z2 = x.w_cosine * x.w_cosine;
+    z2 = max(z2 + dot(turn, 2.0 * x.w_along - turn), min(z2, 0.0004));
+    return FreeDirection(x.w_along - turn, sqrt(z2));
 }
 
 // A direction below a smooth boundary, as it is above it; `eta` is the index below over that above.
-vec4 lf_upwards(vec4 w, float eta) {
-    vec3 part = eta * w.xyz;
+FreeDirection lf_upwards(FreeDirection w, float eta) {
+    vec3 part = eta * w.along;
     float sine = sqrt(dot(part, part));
     float held = min(1.0, 0.9998 / max(sine, 1e-06));
     sine = min(sine, 0.9998);
-    return vec4(part * held, sqrt((1.0 - sine) * (1.0 + sine)));
+    return FreeDirection(part * held, sqrt((1.0 - sine) * (1.0 + sine)));
 }
 
 // Mean path of light that the base sends on: between that of one direction and that of all that cross.
-float lf_between(vec4 y, Crossing x, float part) {
-    float straight = 1.0 / y.w;
+float lf_between(FreeDirection y, Crossing x, float part) {
+    float straight = 1.0 / y.cosine;
     return straight + part * (x.path - straight);
 }
 
@@ -296,7 +306,7 @@ float lf_lobe(Crossing i, Crossing o, float M, float alpha) {
     float base = alpha * M;
     float width2 = lf_blurred2(base, i.a + o.a);
     float x = 0.3431 * (width2 / (base * base + 0.8294 * (i.a * i.a + o.a * o.a)) - 1.0);
-    vec3 t = i.w.xyz + o.w.xyz;
+    vec3 t = i.w_along + o.w_along;
     float v = dot(t, t) / width2;
     return 1.0 / (3.1415927 * width2 * (1.0 + v * (2.0 - x * (1.986 - x * (0.668 - 0.1745 * x)) + (1.0 + x) * v)));
 }
@@ -308,29 +318,29 @@ float lf_wider(float alpha, float coat_alpha) {
 
 // What is left of the direction in light that went to and fro, over pi: more goes on than back, the smoother the base.
 float lf_ahead(Crossing i, Crossing o, float alpha) {
-    vec3 apart = i.air.xyz - o.air.xyz;
-    float back = 0.5 * (dot(apart, apart) + i.air.w * i.air.w + o.air.w * o.air.w);
+    vec3 apart = i.air_along - o.air_along;
+    float back = 0.5 * (dot(apart, apart) + i.air_cosine * i.air_cosine + o.air_cosine * o.air_cosine);
     return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
-float lf_seen(vec4 yi, vec4 yo, float h2, float width) {
-    float M = yi.w + yo.w;
+float lf_seen(FreeDirection yi, FreeDirection yo, float h2, float width) {
+    float M = yi.cosine + yo.cosine;
     float slope = h2 / M;
     float projection_i = lf_ggx_projection(yi, width);
     float projection_o = lf_ggx_projection(yo, width);
-    return slope * slope * (yi.w * yo.w) * lf_v_smith(yi.w, yo.w, projection_i, projection_o);
+    return slope * slope * (yi.cosine * yo.cosine) * lf_v_smith(yi.cosine, yo.cosine, projection_i, projection_o);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 twice_abc = nk * (2.0 * c);
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q - p);
+    vec3 twice_abc = 1.4142135 * nk2 * c;
     vec3 even = larger * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = larger * (q + c2);
@@ -338,13 +348,14 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_coat.eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_coat.alpha);
+    FreeDirection direction = lf_half_vector(wi, wo);
+    float D = lf_ggx_d(direction, lf_coat.alpha);
     float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
     float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
-    float V = lf_v_smith(wi.w, wo.w, projection_i, projection_o);
+    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     Crossing crossing = lf_pass_interface(lf_coat_top, lf_coat.eta, lf_coat.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_coat_top, lf_coat.eta, lf_coat.alpha, wo);
     Crossing crossing3 = lf_pass_interface(lf_coat_both, lf_coat.eta, 1.0, wi);
@@ -356,49 +367,53 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
     there = lf_presence(lf_coat.eta * lf_primer.eta);
     Shares shares = lf_split(crossing3, crossing4, lf_base.alpha);
     float part = 0.7911 * shares.base;
-    vec4 y = lf_upwards(lf_lean(crossing3, crossing3, crossing4, there * shares.i), lf_primer.eta);
+    direction = lf_lean(crossing3, crossing3, crossing4, there * shares.i);
+    FreeDirection y = lf_upwards(direction, lf_primer.eta);
     vec3 left = lf_coat.tau + (lf_between(y, crossing, part) - 1.0) * (2.0 * lf_coat.tau / (1.0 + lf_spread_root(part * crossing.theta, lf_coat.tau)));
-    y = lf_upwards(lf_lean(crossing4, crossing3, crossing4, there * shares.o), lf_primer.eta);
+    direction = lf_lean(crossing4, crossing3, crossing4, there * shares.o);
+    y = lf_upwards(direction, lf_primer.eta);
     left = left + (lf_coat.tau + (lf_between(y, crossing2, part) - 1.0) * (2.0 * lf_coat.tau / (1.0 + lf_spread_root(part * crossing2.theta, lf_coat.tau))));
     kept = kept * exp(-left);
     float throughput = crossing.T * crossing2.T / (lf_coat.eta * lf_coat.eta);
     there = lf_presence(lf_coat.eta);
     shares = lf_split(crossing, crossing2, lf_primer.alpha);
     part = 0.7911 * shares.base;
-    vec4 yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
-    vec4 yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
+    FreeDirection yi = lf_lean(crossing, crossing, crossing2, there * shares.i);
+    FreeDirection yo = lf_lean(crossing2, crossing, crossing2, there * shares.o);
     float path_i = lf_between(yi, crossing, part);
     float path_o = lf_between(yo, crossing2, part);
     vec3 root_i = lf_spread_root(part * crossing.theta, lf_coat.tau);
     vec3 root_o = lf_spread_root(part * crossing2.theta, lf_coat.tau);
     vec3 U = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
     vec3 throughput2 = throughput * exp(-(lf_coat.tau + (path_i - 1.0) * (2.0 * lf_coat.tau / (1.0 + root_i)) + (lf_coat.tau + (path_o - 1.0) * (2.0 * lf_coat.tau / (1.0 + root_o)))));
-    vec4 h = yi + yo;
-    float h2 = dot(h, h);
+    vec3 along = yi.along + yo.along;
+    float cosine = yi.cosine + yo.cosine;
+    float h2 = dot(along, along) + cosine * cosine;
     float F2 = lf_fresnel_dielectric(min(0.5 * sqrt(h2), 1.0), lf_primer.eta);
     float rise = 1.0 + 0.3861 * there * lf_coat.alpha * lf_coat.alpha * shares.base;
     vec3 again = F2 * (lf_amount(lf_coat_inner_again, crossing.s) * lf_amount(lf_coat_inner_again, crossing2.s));
-    vec3 lobes = rise * lf_lobe(crossing, crossing2, h.w, lf_primer.alpha) + again * lf_lobe(crossing, crossing2, h.w, lf_wider(lf_primer.alpha, lf_coat.alpha));
+    vec3 lobes = rise * lf_lobe(crossing, crossing2, cosine, lf_primer.alpha) + again * lf_lobe(crossing, crossing2, cosine, lf_wider(lf_primer.alpha, lf_coat.alpha));
     vec3 root = lf_amount(lf_coat_inner_rest, crossing.s) * lf_amount(lf_coat_inner_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_primer.alpha);
     throughput = crossing3.T * crossing4.T / (eta * eta);
     there = lf_presence(eta);
     shares = lf_split(crossing3, crossing4, lf_base.alpha);
     part = 0.7911 * shares.base;
-    vec4 yi2 = lf_lean(crossing3, crossing3, crossing4, there * shares.i);
-    vec4 yo2 = lf_lean(crossing4, crossing3, crossing4, there * shares.o);
+    FreeDirection yi2 = lf_lean(crossing3, crossing3, crossing4, there * shares.i);
+    FreeDirection yo2 = lf_lean(crossing4, crossing3, crossing4, there * shares.o);
     path_i = lf_between(yi2, crossing3, part);
     path_o = lf_between(yo2, crossing4, part);
     root_i = lf_spread_root(part * crossing3.theta, lf_primer.tau);
     root_o = lf_spread_root(part * crossing4.theta, lf_primer.tau);
     vec3 U2 = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o);
     vec3 throughput3 = throughput * exp(-(lf_primer.tau + (path_i - 1.0) * (2.0 * lf_primer.tau / (1.0 + root_i)) + (lf_primer.tau + (path_o - 1.0) * (2.0 * lf_primer.tau / (1.0 + root_o)))));
-    h = yi2 + yo2;
-    float h22 = dot(h, h);
+    along = yi2.along + yo2.along;
+    cosine = yi2.cosine + yo2.cosine;
+    float h22 = dot(along, along) + cosine * cosine;
     vec3 F3 = lf_fresnel_conductor(min(0.5 * sqrt(h22), 1.0), lf_base.eta, lf_base.k);
     rise = 1.0 + 0.3861 * there * alpha * alpha * shares.base;
     again = F3 * (lf_amount(lf_coat_again, crossing3.s) * lf_amount(lf_coat_again, crossing4.s));
-    vec3 lobes2 = rise * lf_lobe(crossing3, crossing4, h.w, lf_base.alpha) + again * lf_lobe(crossing3, crossing4, h.w, lf_wider(lf_base.alpha, alpha));
+    vec3 lobes2 = rise * lf_lobe(crossing3, crossing4, cosine, lf_base.alpha) + again * lf_lobe(crossing3, crossing4, cosine, lf_wider(lf_base.alpha, alpha));
     root = lf_amount(lf_coat_rest, crossing3.s) * lf_amount(lf_coat_rest, crossing4.s);
     vec3 rest2 = root * root * lf_ahead(crossing3, crossing4, lf_base.alpha);
     vec3 value = F * (D * V) + (throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_primer.alpha) * lobes) + rest) + kept * (throughput3 * (F3 * U2 * (lf_seen(yi2, yo2, h22, lf_base.alpha) * lobes2) + rest2)));
@@ -409,7 +424,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

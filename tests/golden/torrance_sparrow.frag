@@ -15,6 +15,11 @@ struct TorranceSparrow {
     vec3 k;       // index of refraction, imaginary part
 };
 
+struct FreeDirection {
+    vec3 along;    // part along the surface, in any space
+    float cosine;  // cosine to its normal
+};
+
 const TorranceSparrow lf_base = TorranceSparrow(
     vec3(0.05, 0.02, 0.01),     // kd: diffuse part
     12.0,                       // ks: strength of the lobe
@@ -37,26 +42,29 @@ float lf_atan2(float y, float x) {
 }
 
 // The unit vector halfway between two directions on the same side of the surface.
-vec4 lf_half_vector(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return s * inversesqrt(dot(s, s));
+FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float inverse = inversesqrt(dot(along, along) + cosine * cosine);
+    return FreeDirection(along * inverse, cosine * inverse);
 }
 
 // The cosine between either direction and their half vector.
-float lf_half_cosine(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    return 0.5 * sqrt(dot(s, s));
+float lf_half_cosine(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    return 0.5 * sqrt(dot(along, along) + cosine * cosine);
 }
 
 // Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2).
 vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
     float c2 = c * c;
     float s2 = 1.0 - c2;
-    vec3 p = (eta - k) * (eta + k) - s2;
-    vec3 nk = eta * k;
-    vec3 q = sqrt(p * p + 4.0 * nk * nk);
-    vec3 larger = sqrt(0.5 * (q + (-p)));
-    vec3 twice_abc = nk * (2.0 * c);
+    vec3 p = (eta - k) * (eta + k) - 1.0 + c2;
+    vec3 nk2 = 2.0 * eta * k;
+    vec3 q = sqrt(p * p + nk2 * nk2);
+    vec3 larger = sqrt(q - p);
+    vec3 twice_abc = 1.4142135 * nk2 * c;
     vec3 even = larger * (q * c2 + s2 * s2);
     vec3 odd = twice_abc * s2;
     vec3 across = larger * (q + c2);
@@ -64,23 +72,24 @@ vec3 lf_fresnel_conductor(float c, vec3 eta, vec3 k) {
 }
 
 // G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10).
-float lf_v_cavity(vec4 wi, vec4 wo) {
-    vec4 s = wi + wo;
-    float NoH_over_c = 2.0 * s.w / dot(s, s);
-    return min(0.25 / max(wi.w * wo.w, 1e-14), 0.5 * NoH_over_c / max(wi.w, wo.w));
+float lf_v_cavity(FreeDirection wi, FreeDirection wo) {
+    vec3 along = wi.along + wo.along;
+    float cosine = wi.cosine + wo.cosine;
+    float NoH_over_c = 2.0 * cosine / (dot(along, along) + cosine * cosine);
+    return min(0.25 / max(wi.cosine * wo.cosine, 1e-14), 0.5 * NoH_over_c / max(wi.cosine, wo.cosine));
 }
 
 // exp(-(kappa delta)^2), delta the angle between facet and surface (Torrance and Sparrow 1967).
-float lf_torrance_sparrow_d(vec4 h, float kappa) {
-    float delta = lf_atan2(sqrt(dot(h.xyz, h.xyz)), h.w);
+float lf_torrance_sparrow_d(FreeDirection h, float kappa) {
+    float delta = lf_atan2(sqrt(dot(h.along, h.along)), h.cosine);
     float slope = kappa * delta;
     return exp(-(slope * slope));
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
-vec3 lf_evaluate(vec4 wi, vec4 wo) {
-    bool lit = min(wi.w, wo.w) > 1e-07;
-    vec4 h = lf_half_vector(wi, wo);
+vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
+    bool lit = min(wi.cosine, wo.cosine) > 1e-07;
+    FreeDirection h = lf_half_vector(wi, wo);
     float c = lf_half_cosine(wi, wo);
     float V = lf_v_cavity(wi, wo);
     vec3 value = lf_base.ks * lf_fresnel_conductor(c, lf_base.eta, lf_base.k) * (lf_torrance_sparrow_d(h, lf_base.kappa) * V) + lf_base.kd / 3.1415927;
@@ -91,7 +100,7 @@ vec3 lf_evaluate(vec4 wi, vec4 wo) {
 vec3 lf_brdf(vec3 n, vec3 v, vec3 l) {
     float NoL = dot(n, l);
     float NoV = dot(n, v);
-    return lf_evaluate(vec4(l - NoL * n, NoL), vec4(v - NoV * n, NoV));
+    return lf_evaluate(FreeDirection(l - NoL * n, NoL), FreeDirection(v - NoV * n, NoV));
 }
 
 #ifndef LF_LIBRARY

@@ -8,7 +8,7 @@ surface does below its coat (no 1 / eta^2, one bounce, a smooth way through a ro
 import dataclasses
 from typing import Any, Literal
 
-from .._chunk import safe_divide, struct, where
+from .._chunk import divide, safe_divide, struct, where
 from .._types import Colour, Direction, Scalar
 from ..layers import Coat
 from ..optics.directions import above, both_above
@@ -58,7 +58,8 @@ def prepare(coats: tuple[Coat, ...], base: Any, options: Faithful) -> Prepared:
 
 def evaluate(prepared: Prepared, wi: Direction, wo: Direction, options: Faithful) -> Colour:
     """BRDF [1/sr] of unit directions above the surface."""
-    return _evaluate(prepared.coats, prepared.base, wi, wo, None, options)
+    lit = both_above(wi, wo)
+    return where(lit, _evaluate(prepared.coats, prepared.base, above(lit, wi), above(lit, wo), None, options), 0.0)
 
 
 Half = tuple[Direction, Scalar] | None
@@ -66,14 +67,9 @@ Half = tuple[Direction, Scalar] | None
 
 
 def _evaluate(coats: tuple[Coat, ...], base: Any, wi: Direction, wo: Direction, half: Half, options: Faithful) -> Colour:
-    # Below the surface, or lost by total internal reflection above: no light. The dummy keeps derivatives finite.
-    lit = both_above(wi, wo)
-    wi, wo = above(lit, wi), above(lit, wo)
     if coats:
-        f = _coat_over(coats[0], coats[1:], base, wi, wo, half, options)
-    else:
-        f = base.evaluate(wi, wo) if half is None else base.about(wi, wo, *half)
-    return where(lit, f, 0.0)
+        return _coat_over(coats[0], coats[1:], base, wi, wo, half, options)
+    return base.evaluate(wi, wo) if half is None else base.about(wi, wo, *half)
 
 
 def _coat_over(
@@ -87,8 +83,7 @@ def _coat_over(
     F = coat.reflectance(c)
     D = coat.density(h)
     V = coat.visibility(wi, wo)
-    top = F * D * V
-    G = 4.0 * V * wi[-1] * wo[-1]
+    top = F * V * D
     half = None
     if options.refract_at == "h":
         # Bent about it, both keep their half vector: all layers have the same.
@@ -106,11 +101,15 @@ def _coat_over(
         T12 = coat.transmittance(wi[-1])
         T21 = coat.transmittance(wo[-1])
         R21 = 1.0 - T21
-    t = 1.0 - G * R21 if options.masked else T21
+    t = 1.0 - 4.0 * wi[-1] * (R21 * V * wo[-1]) if options.masked else T21
+    # Lost by total internal reflection: no light. The guard keeps derivatives finite.
+    lit = both_above(wi_below, wo_below)
+    wi_below, wo_below = above(lit, wi_below), above(lit, wo_below)
     rest = T12 * t * _evaluate(below, base, wi_below, wo_below, half, options)
     if coat.tau is not None:
-        at_h = half_cosine(wi_below, wo_below) if half is None else half[1]
-        cos_i, cos_o = (at_h, at_h) if options.absorb_at == "h" else (wi_below[-1], wo_below[-1])
-        path = safe_divide(cos_i + cos_o, cos_i * cos_o)
+        if options.absorb_at == "h":
+            path = safe_divide(2.0, half_cosine(wi_below, wo_below) if half is None else half[1])
+        else:
+            path = divide(wi_below[-1] + wo_below[-1], wi_below[-1] * wo_below[-1])
         rest = rest * transmittance(coat.tau, path)
-    return top + rest
+    return where(lit, top + rest, top)

@@ -19,10 +19,10 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, dot, member, safe_power, safe_sqrt, struct, where
+from .._chunk import chunk, member, safe_power, safe_sqrt, struct, where
 from .._types import Colour, Direction, Number, Scalar
 from ..layers import Coat
-from ..optics.directions import along, direction
+from ..optics.directions import along, direction, product
 from ..optics.microfacet import Width, half_cosine
 from ..optics.scattering import henyey_greenstein, mean_transmittance, once_back, once_through
 from ..surfaces.base import Lobe, Surface
@@ -195,7 +195,7 @@ def scattered(haze: Haze | None, coat: Coat, base: Surface, i: Way, o: Way, spre
     power `POWER`.
     """
     g, tau_s = coat.g, coat.tau_s
-    back = 1.0 + dot(i.w, o.w)
+    back = 1.0 + product(i.w, o.w)
     phase = EVENLY if g is None else widened_phase(back, g, spread)
     if haze is None:
         return once_back(phase, tau_s, coat.extinction, i.path, o.path)
@@ -225,9 +225,9 @@ def _by_way_of(lobe: Lobe, haze: Haze, coat: Coat, i: Way, o: Way, spread: Scala
         return f
     tau = coat.extinction
     wider = spread + width_power(lobe.width)
-    on = 1.0 - dot(direction(-along(i.w), i.w[-1]), o.w)
+    on = 1.0 - product(direction(-along(i.w), i.w[-1]), o.w)
     phase_on = widened_phase(on, g, wider) - even
-    phase_back = widened_phase(1.0 + dot(i.w, o.w), g, wider + width_power(lobe.width)) - even
+    phase_back = widened_phase(1.0 + product(i.w, o.w), g, wider + width_power(lobe.width)) - even
     up_i, up_o = F_i * jnp.exp(-tau * i.path), F_o * jnp.exp(-tau * o.path)
     f = f + once_by_mirror(phase_on, phase_back, tau_s, tau, i.path, o.path, up_i, up_o)
     forwards = jnp.maximum(g, 0.0)

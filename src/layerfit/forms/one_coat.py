@@ -17,7 +17,7 @@ import jax.numpy as jnp
 from .._chunk import chunk, clip, dot, member, struct
 from .._types import Colour, Direction, Scalar
 from ..layers import Coat
-from ..optics.directions import along, direction, sine2
+from ..optics.directions import along, direction, product, sine2
 from ..optics.interface import facet_cosine, rough_transmittance
 from ..optics.microfacet import Width, visibility
 from .axes import Widths, area, even_width, over_axes, stretched, tops, towards, widths
@@ -140,7 +140,7 @@ def below(i: Crossing, o: Crossing, prepared: Prepared) -> Colour:
         U = (1.0 + (path_i - 1.0) / root_i) * (1.0 + (path_o - 1.0) / root_o)
         throughput = throughput * jnp.exp(-(depth(path_i, root_i, tau) + depth(path_o, root_o, tau)))
     h = yi + yo
-    h2 = dot(h, h)
+    h2 = product(h, h)
     F = base.reflectance(jnp.minimum(0.5 * jnp.sqrt(h2), 1.0))
     even = even_width(alpha)
     rise = 1.0 + RISE * there * even * even * share

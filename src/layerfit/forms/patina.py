@@ -12,12 +12,12 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from .._chunk import chunk, dot, member, struct, where
+from .._chunk import chunk, member, struct, where
 from .._place import Place
 from .._types import Colour, Direction, Scalar
 from ..errors import InputError
 from ..layers import Patina
-from ..optics.directions import above, both_above
+from ..optics.directions import above, both_above, product
 from ..optics.fresnel import transmittance_dielectric
 from ..optics.growth import onset, tarnish_thickness
 from ..optics.medium import refract_about_normal
@@ -179,5 +179,5 @@ def scattered_once(wi: Direction, wo: Direction, eta: Scalar, albedo: Colour, de
     T = transmittance_dielectric(wi[-1], eta) * transmittance_dielectric(wo[-1], eta)
     wi = refract_about_normal(wi, eta)
     wo = refract_about_normal(wo, eta)
-    phase = EVENLY if g is None else henyey_greenstein(1.0 + dot(wi, wo), g)
+    phase = EVENLY if g is None else henyey_greenstein(1.0 + product(wi, wo), g)
     return T / (eta * eta) * scattered_back(phase, albedo, depth, wi[-1], wo[-1])

@@ -4,6 +4,8 @@
 Indices are relative: the medium below divided by the medium above.
 """
 
+import math
+
 import jax.numpy as jnp
 
 from .._chunk import chunk, divide, safe_divide, safe_sqrt, where
@@ -23,9 +25,10 @@ def fresnel_dielectric(c: Scalar, eta: Colour) -> Colour:
     eta2 = eta * eta
     perpendicular = 1.0 / (c + g)
     parallel = 1.0 / (eta2 * c + g)
-    rs = delta * (perpendicular * perpendicular)
-    rp = delta * ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel)
-    reflectance = 0.5 * (rs * rs + rp * rp)
+    # Over delta, which is a factor of both.
+    rs = perpendicular * perpendicular
+    rp = ((eta2 + 1.0) * (c * c) - 1.0) * (parallel * parallel)
+    reflectance = 0.5 * (delta * delta) * (rs * rs + rp * rp)
     return where(eta == 1.0, 0.0, where(refracts, reflectance, 1.0))
 
 
@@ -36,7 +39,7 @@ def transmittance_dielectric(c: Scalar, eta: Colour) -> Colour:
     eta2 = eta * eta
     perpendicular = safe_divide(1.0, c + g)
     parallel = safe_divide(1.0, eta2 * c + g)
-    passed = 2.0 * (c * g) * (perpendicular * perpendicular + eta2 * (parallel * parallel))
+    passed = 2.0 * c * g * (perpendicular * perpendicular + eta2 * (parallel * parallel))
     return where(eta == 1.0, 1.0, passed)
 
 
@@ -45,15 +48,15 @@ def fresnel_conductor(c: Scalar, eta: Colour, k: Colour) -> Colour:
     """Exact reflectance of a conductor eta + i k (Born and Wolf 1999, 14.2)."""
     c2 = c * c
     s2 = 1.0 - c2
-    p = (eta - k) * (eta + k) - s2
-    nk = eta * k
-    q = jnp.sqrt(jnp.maximum(p * p + 4.0 * nk * nk, 1e-24))
-    # a = sqrt((q + p) / 2) cancels where p < 0, as in every metal; there b = sqrt((q - p) / 2) does not and a = nk / b.
-    larger = jnp.sqrt(0.5 * (q + jnp.abs(p)))
-    # All is multiplied by b, which spares the division.
+    p = (eta - k) * (eta + k) - 1.0 + c2
+    nk2 = 2.0 * eta * k
+    q = jnp.sqrt(jnp.maximum(p * p + nk2 * nk2, 1e-24))
+    # a = sqrt((q + p) / 2) cancels where p < 0, as in every metal; there b = sqrt((q - p) / 2) does not and a = n k / b.
+    larger = jnp.sqrt(q + jnp.abs(p))
+    # All is multiplied by sqrt(2) b there, which spares the division.
     metal = p < 0.0
     b = where(metal, larger, 1.0)
-    twice_abc = where(metal, nk, larger) * (2.0 * c)
+    twice_abc = math.sqrt(2.0) * where(metal, nk2, larger) * c
     # Rp is Rs (even - odd) / (even + odd), so that the mean of both is Rs even / (even + odd).
     even = b * (q * c2 + s2 * s2)
     odd = twice_abc * s2

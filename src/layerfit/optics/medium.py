@@ -15,7 +15,8 @@ def refract_about_normal(w: Direction, eta: Scalar) -> Direction:
     """Direction below a boundary of relative index `eta` (Snell's law); its z is 0 under total internal reflection."""
     # (eta^2 - 1 + z^2) / eta^2 is 1 - (1 - z^2) / eta^2 without the cancellation at grazing angles.
     z2 = (eta - 1.0) * (eta + 1.0) + w[-1] * w[-1]
-    return direction(along(w), safe_sqrt(z2)) * (1.0 / eta)
+    inverse = 1.0 / eta
+    return direction(along(w), safe_sqrt(z2)) * inverse
 
 
 @chunk
@@ -28,10 +29,11 @@ def cosine_below(c: Scalar, eta: Scalar) -> Scalar:
 def refract_about_facet(w: Direction, h: Direction, c: Scalar, c_below: Scalar, eta: Scalar) -> Direction:
     """Direction below a facet with normal `h`, c = w.h (Elek 2010 after Weidlich and Wilkie 2007); z may be <= 0."""
     inverse = 1.0 / eta
-    return w * inverse + (c_below - c * inverse) * h
+    turn = c_below - c * inverse
+    return w * inverse + turn * h
 
 
 @chunk
 def transmittance(tau: Colour, path: Scalar) -> Colour:
     """Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence."""
-    return jnp.exp(-(tau * path))
+    return jnp.exp(-tau * path)

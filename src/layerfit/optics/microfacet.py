@@ -13,9 +13,9 @@ from typing import Any, Literal
 import jax
 import jax.numpy as jnp
 
-from .._chunk import chunk, dot, safe_divide, safe_sqrt, where
+from .._chunk import chunk, safe_divide, safe_sqrt, where
 from .._types import Direction, Scalar, Vec3
-from .directions import sine2
+from .directions import product, sine2
 
 Distribution = Literal["ggx", "beckmann"]
 Masking = Literal["smith", "smith_separable", "vcavity"]
@@ -29,8 +29,8 @@ _INV_SQRT_PI = 1.0 / math.sqrt(math.pi)
 def ggx_d(h: Direction, alpha: Scalar) -> Scalar:
     """GGX density of facet normals (Walter et al. 2007, eq. 33)."""
     # |h.xy|^2 + alpha^2 h.z^2, never NoH^2 (alpha^2 - 1) + 1: that cancels where alpha is small.
-    root = alpha / (sine2(h) + alpha * alpha * (h[-1] * h[-1]))
-    return root * root * _INV_PI
+    root = alpha * _INV_SQRT_PI / (sine2(h) + alpha * alpha * (h[-1] * h[-1]))
+    return root * root
 
 
 @chunk
@@ -138,7 +138,7 @@ def v_smith_separable(NoL: Scalar, NoV: Scalar, projection_l: Scalar, projection
 def v_cavity(wi: Direction, wo: Direction) -> Scalar:
     """G / (4 NoL NoV), V-shaped grooves (Torrance and Sparrow 1967; Cook and Torrance 1982, eq. 10)."""
     s = wi + wo
-    NoH_over_c = 2.0 * s[-1] / jnp.maximum(dot(s, s), 1e-20)
+    NoH_over_c = 2.0 * s[-1] / jnp.maximum(product(s, s), 1e-20)
     return jnp.minimum(safe_divide(0.25, wi[-1] * wo[-1]), safe_divide(0.5 * NoH_over_c, jnp.maximum(wi[-1], wo[-1])))
 
 
@@ -155,7 +155,8 @@ def visibility(masking: Masking, distribution: Distribution, wi: Direction, wo: 
 def half_vector(wi: Direction, wo: Direction) -> Direction:
     """The unit vector halfway between two directions on the same side of the surface."""
     s = wi + wo
-    return s * jax.lax.rsqrt(jnp.maximum(dot(s, s), 1e-20))
+    inverse = jax.lax.rsqrt(jnp.maximum(product(s, s), 1e-20))
+    return s * inverse
 
 
 @chunk
@@ -163,4 +164,4 @@ def half_cosine(wi: Direction, wo: Direction) -> Scalar:
     """The cosine between either direction and their half vector."""
     # |wi + wo| / 2: the dot product with the half vector loses it near 0 (grazing, opposite).
     s = wi + wo
-    return 0.5 * jnp.sqrt(jnp.maximum(dot(s, s), 1e-20))
+    return 0.5 * jnp.sqrt(jnp.maximum(product(s, s), 1e-20))

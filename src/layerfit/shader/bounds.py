@@ -92,9 +92,10 @@ def inner_of(eqn: Any) -> tuple[Any, Sequence[Any]] | None:
 def _results(eqn: Any, given: list[Bounds], calls: Calls) -> list[Bounds]:
     name = eqn.params.get("name") if eqn.primitive.name in ("jit", "pjit") else eqn.primitive.name
     if name == "above":  # used only where the direction's cosine, its last number, is above the least
-        low, high = (np.broadcast_to(end, eqn.outvars[0].aval.shape).copy() for end in given[-1])
+        *along, last = given[-len(eqn.outvars) :]
+        low, high = (np.broadcast_to(end, eqn.outvars[-1].aval.shape).copy() for end in last)
         low.flat[-1] = max(low.flat[-1], LEAST_COSINE)
-        return [Bounds(low, high)]
+        return [*along, Bounds(low, high)]
     if name == "half_cosine":  # of unit vectors
         return [Bounds(0.0, 1.0 + ROUNDING)]
     if name == "fetch":  # the least and the largest of the table

@@ -13,6 +13,7 @@ from .. import __version__
 from .._chunk import CHUNKS
 from .._fields import params
 from .._place import TANGENT, Place
+from .._types import FreeDirection
 from ..forms import weathering
 from ..optics.lazanyi import fit_lazanyi
 from ..preset import left_out, model_name
@@ -174,7 +175,9 @@ def _inputs(shader: Shader) -> list[tuple[jax.Array, str, Bounds]]:
     if COSINES in shader.asks:
         one = jnp.ones((), jnp.float32)
         return [(one, "NoL", within), (one, "NoV", within), (one, "lean2", Bounds(0.0, 4.0 + UNIT))]
-    w = jnp.array([0.0, 0.0, 0.0, 1.0] if FREE in shader.asks else [0.0, 0.0, 1.0], jnp.float32)
+    w: Any = jnp.array([0.0, 0.0, 1.0], jnp.float32)
+    if FREE in shader.asks:
+        w = FreeDirection(jnp.zeros(3, jnp.float32), jnp.ones((), jnp.float32))
     place = [(jnp.zeros(SIZES[name][1], jnp.float32), name, ANY) for name in shader.stack.reads]
     return [(w, "wi", within), (w, "wo", within), *place]
 

@@ -47,6 +47,20 @@ def _operator(symbol: str, binds: int, neutral: str | None = None, neutral_left:
     return write
 
 
+def _sum_or_difference(write: Callable[..., Value], of_negative: Callable[..., Value]):
+    """One of them; of a negative number it is the other."""
+
+    def either(body: Any, eqn: Any, a: Value, b: Value) -> Value:
+        if a.text != "0.0" and b.binds == UNARY and b.text.startswith("-"):
+            return of_negative(body, eqn, a, Value(b.text[1:], b.type, ATOM, b.reads))
+        return write(body, eqn, a, b)
+
+    return either
+
+
+_plus, _minus = _operator("+", SUM, "0.0", neutral_left=True), _operator("-", SUM, "0.0")
+
+
 def _function(name: str, lifted: bool = False):
     def write(body: Any, eqn: Any, *args: Value) -> Value:
         kind = wider(*args)
@@ -172,8 +186,8 @@ GUARDS = {"above"}
 """Traced functions that keep derivatives finite where a value is not used: in a shader, their last operand."""
 
 PRIMITIVES: dict[str, Callable[..., Value]] = {
-    "add": _operator("+", SUM, "0.0", neutral_left=True),
-    "sub": _operator("-", SUM, "0.0"),
+    "add": _sum_or_difference(_plus, _minus),
+    "sub": _sum_or_difference(_minus, _plus),
     "mul": _operator("*", PRODUCT, "1.0", neutral_left=True),
     "div": _operator("/", PRODUCT, "1.0"),
     "neg": _negate,

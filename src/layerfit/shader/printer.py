@@ -18,7 +18,7 @@ from .bounds import ANY, Bounds, Calls, call, exactly, known, read, resolved, se
 from .glsl import ATOM, PREFIX, UNARY, PrintError, StructType, Value, glsl_type, indent, lift, literal, reads, safe
 from .names import name_of, source_of
 from .primitives import BUILTINS, GUARDS, PRIMITIVES
-from .structs import comment_lines, comment_of, grouped, leaves_of, result_paths, struct_text, struct_value
+from .structs import comment_lines, comments_of, grouped, leaves_of, result_paths, struct_of, struct_text, struct_value
 
 Parameter = tuple[str, str, StructType | None]
 """Of a chunk: its name, its type, and the struct that it is."""
@@ -58,7 +58,7 @@ class Printer:
         key = (cls.__name__, tuple(leaves))
         if key not in self.structs:
             taken = sum(name == cls.__name__ for name, _ in self.structs)
-            comments = {safe(f.name): comment_of(f) for f in dataclasses.fields(cls)}
+            comments = comments_of(cls)
             fields = tuple((name, kind, comments.get(name, "")) for name, kind in leaves)
             self.structs[key] = StructType(cls.__name__ + (str(taken + 1) if taken else ""), fields)
         return self.structs[key]
@@ -95,11 +95,13 @@ class Printer:
         """Print `fn(*given, *params)` as the GLSL function `name`.
 
         `given` are pytrees that stand outside the function (constants, uniforms), each with the expression to reach it, its leaves by
-        field; `params` are arrays that become parameters, each with what it can be. Numbers that are `constant` are those of `given`.
+        field; `params` are arrays or structs that become parameters, each with what its numbers can be. Numbers that are `constant` are
+        those of `given`.
         """
         closed = jax.make_jaxpr(fn)(*(tree for tree, _ in given), *(array for array, _, _ in params))
         numbers = [leaf for tree, _ in given for leaf in jax.tree.leaves(tree)]
-        bounds = [*((exactly(leaf) if constant else ANY) for leaf in numbers), *(limits for _, _, limits in params)]
+        bounds = [exactly(leaf) if constant else ANY for leaf in numbers]
+        bounds += [limits for value, _, limits in params for _ in jax.tree.leaves(value)]
         body = Body(self, closed.jaxpr, closed.consts, bounds)
         names: list[str] = []
         for tree, text in given:
@@ -110,10 +112,13 @@ class Printer:
             if dataclasses.is_dataclass(tree):
                 self.struct(tree, [(path, glsl_type(np.asarray(leaf, np.float32))) for path, leaf in leaves_of(tree)])
         declared = []
-        for array, param, _ in params:
-            declared.append(f"{glsl_type(array)} {param}")
-            body.parameter(param, glsl_type(array))
-            body.bind_next(Value(param, glsl_type(array), reads=frozenset({param})))
+        for value, param, _ in params:
+            leaves = [(path, glsl_type(leaf)) for path, leaf in leaves_of(value)]
+            kind = self.struct(value, leaves).name if dataclasses.is_dataclass(value) else leaves[0][1]
+            declared.append(f"{kind} {param}")
+            body.parameter(param, kind)
+            for path, leaf_kind in leaves:
+                body.bind_next(Value(f"{param}.{path}" if path else param, leaf_kind, reads=frozenset({param})))
         (result,) = body.run()
         kind = glsl_type(closed.out_avals[0])
         doc = comment_lines(fn)
@@ -136,17 +141,21 @@ class Printer:
         notes = inspect.get_annotations(fn)
         groups = grouped(info.arg_names, [v.aval for v in jaxpr.invars])
         params = [
-            (root, leaves[0][1] if leaves[0][0] == "" else "", self.struct(notes[root], leaves) if leaves[0][0] else None)
+            (
+                root,
+                leaves[0][1] if leaves[0][0] == "" else "",
+                self.struct(struct_of(notes[root]), leaves) if leaves[0][0] else None,
+            )
             for root, leaves in groups
         ]
         returned = None
         if len(jaxpr.outvars) > 1:
-            if not dataclasses.is_dataclass(notes.get("return")):
+            if not dataclasses.is_dataclass(cls := struct_of(notes.get("return"))):
                 raise PrintError(
                     f"the chunk {name} returns several values: give them a struct, and the function its annotation"
                 )
-            ((_, leaves),) = grouped(result_paths(info, notes["return"]), [v.aval for v in jaxpr.outvars])
-            returned = self.struct(notes["return"], leaves)
+            ((_, leaves),) = grouped(result_paths(info, cls), [v.aval for v in jaxpr.outvars])
+            returned = self.struct(cls, leaves)
         body = Body(self, jaxpr, closed.consts, bounds)
         for (root, kind, struct), (_, leaves) in zip(params, groups, strict=True):
             root = safe(root)
@@ -307,7 +316,7 @@ class Body:
         if primitive in ("jit", "pjit"):
             closed, called = eqn.params["jaxpr"], eqn.params["name"]
             if called in GUARDS:
-                return [operands[-1]]
+                return operands[-len(eqn.outvars) :]
             if called == "fetch":
                 table, row = operands
                 return [Value(f"{table.text}[{row.text}]", glsl_type(eqn.outvars[0].aval), reads=reads(*operands))]
@@ -342,7 +351,9 @@ class Body:
         reads = frozenset().union(*(a.reads for a in arguments))
         if returned is None:
             return [Value(text, glsl_type(closed.out_avals[0]), reads=reads)]
-        whole = self.local(name or returned.name.lower(), Value(text, returned.name, reads=reads))
+        whole = self.local(
+            name or re.findall("[A-Z][a-z]*", returned.name)[-1].lower(), Value(text, returned.name, reads=reads)
+        )
         return [Value(f"{whole.text}.{field}", kind, reads=whole.reads) for field, kind, _ in returned.fields]
 
     def _loop(self, eqn: Any, operands: list[Value]) -> list[Value]:

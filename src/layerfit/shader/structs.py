@@ -3,7 +3,7 @@
 import dataclasses
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, get_args
 
 import jax
 import numpy as np
@@ -24,7 +24,12 @@ def struct_value(leaves: Sequence[Value], struct: StructType) -> Value:
 
 def leaves_of(tree: Any) -> list[tuple[str, Any]]:
     leaves = jax.tree_util.tree_leaves_with_path(tree)
-    return [(safe(jax.tree_util.keystr(path, simple=True, separator=".")), leaf) for path, leaf in leaves]
+    return [(_joined(jax.tree_util.keystr(path, simple=True, separator=".")), leaf) for path, leaf in leaves]
+
+
+def _joined(path: str) -> str:
+    """The field of a struct that stands for one of a struct in it: GLSL's are flat here."""
+    return safe(path.replace(".", "_"))
 
 
 def named_leaves(root: str, value: Any) -> list[tuple[str, np.ndarray]]:
@@ -39,7 +44,7 @@ def grouped(paths: Sequence[str], avals: Sequence[Any]) -> list[tuple[str, list[
         root, _, leaf = path.partition(".")
         if not groups or groups[-1][0] != root:
             groups.append((root, []))
-        groups[-1][1].append((safe(leaf), glsl_type(aval)))
+        groups[-1][1].append((_joined(leaf), glsl_type(aval)))
     return groups
 
 
@@ -49,6 +54,22 @@ def result_paths(info: Any, cls: Any) -> list[str]:
         return info.result_paths
     # JAX finds the fields by building a struct of placeholders, which one that checks its arguments does not take.
     return [f"result.{field.name}" for field in dataclasses.fields(cls)]
+
+
+def struct_of(note: Any) -> Any:
+    """The struct that an annotation allows, if any: `Direction` is one of them or an array."""
+    return next((kind for kind in get_args(note) if dataclasses.is_dataclass(kind)), note)
+
+
+def comments_of(cls: Any) -> dict[str, str]:
+    """What stands beside the fields of a struct, and beside those of structs in it."""
+    comments = {}
+    for field in dataclasses.fields(cls):
+        comments[safe(field.name)] = comment_of(field)
+        if dataclasses.is_dataclass(inner := struct_of(field.type)):
+            parts = dataclasses.fields(inner)
+            comments |= {_joined(f"{field.name}.{part.name}"): f"{comment_of(field)}: {comment_of(part)}" for part in parts}
+    return comments
 
 
 def comment_of(field: dataclasses.Field[Any]) -> str:

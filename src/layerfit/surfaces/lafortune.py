@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from .._chunk import chunk, dot, safe_sqrt, static, where
 from .._fields import layer, param
 from .._types import Colour, Direction, Number, Scalar, Vec3
+from ..optics.directions import numbers
 from ..optics.microfacet import Width
 from .base import Lobe, variance
 from .diffuse import TwoParts, kd_param
@@ -19,6 +20,7 @@ from .diffuse import TwoParts, kd_param
 def lafortune_log_product(wi: Direction, wo: Direction, C: Vec3) -> Scalar:
     """log(Cx wi.x wo.x + Cy wi.y wo.y + Cz wi.z wo.z), which is 0 at the peak of Phong's lobe; -1e4 where there is none."""
     # a b = (a^2 + b^2 - (a - b)^2) / 2, with signs, and unit vectors: the sum less 1 has its own digits near 0.
+    wi, wo = numbers(wi), numbers(wo)
     C = _as_many(C, wi)
     magnitude = jnp.abs(C)
     apart = wi - jnp.sign(C) * wo
@@ -31,11 +33,12 @@ def lafortune_log_product(wi: Direction, wo: Direction, C: Vec3) -> Scalar:
 @chunk
 def lafortune_log_length(w: Direction, C: Vec3) -> Scalar:
     """log of the length of (Cx w.x, Cy w.y, Cz w.z): the most that any direction makes of the product with w."""
+    w = numbers(w)
     weighted = _as_many(C, w) * w
     return 0.5 * jnp.log(jnp.maximum(dot(weighted, weighted), 1e-12))
 
 
-def _as_many(C: Vec3, w: Direction) -> jax.Array:
+def _as_many(C: Vec3, w: jax.Array) -> jax.Array:
     """The weights of as many numbers as a direction has: without a frame there are three along the surface, all weighted alike."""
     return C if len(w) == len(C) else jnp.concatenate([C[:1], C])
 

@@ -83,7 +83,7 @@ class Covered:
         h2 = M2 + x2
         F = self.reflectance(half_root(h2) if self.film else h2)
         path = i.path + o.path
-        A = F if self.tau is None else F * (jnp.exp(-(self.tau * path)) if self.left is None else self.left(path))
+        A = F if self.tau is None else F * (jnp.exp(-self.tau * path) if self.left is None else self.left(path))
         R = 0.5 * (i.R + o.R)
         q = A * (R + (1.0 - R) * (i.edge + o.edge))
         a2 = self.variance(i.width + o.width)

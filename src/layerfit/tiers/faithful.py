@@ -66,7 +66,7 @@ class FaithfulUnderCoat(Compact):
         else:
             rest = self.radiance * rest
         if self.coat.tau is not None:
-            rest = rest * jnp.exp(-(self.coat.tau * ((z_i + z_o) / (z_i * z_o))))
+            rest = rest * jnp.exp(-self.coat.tau * ((z_i + z_o) / (z_i * z_o)))
         f = top.reflected + rest
         return where(lit, where(jnp.minimum(z_i, z_o) > 0.0, f, top.reflected), 0.0)
 

@@ -67,7 +67,7 @@ class Precomputed(Compact):
         lobe = self.facing(lean, M, s2, self.alpha) * 0.5 / (z_o * hidden_i + z_i * hidden_o)
         rest: Any = metal * (left * lobe)
         if self.coat.tau is not None:
-            rest = rest * jnp.exp(-(self.coat.tau * ((z_i + z_o) / (z_i * z_o))))
+            rest = rest * jnp.exp(-self.coat.tau * ((z_i + z_o) / (z_i * z_o)))
         f = top + rest
         return where(lit, where(jnp.minimum(z_i, z_o) > 0.0, f, top), 0.0)
 
