@@ -178,21 +178,18 @@ vec3 lf_half_vector(vec3 wi, vec3 wo) {
     return s * inverse;
 }
 
-// GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float root = alpha * 0.5641896 / (dot(h.xy, h.xy) + alpha * alpha * (h.z * h.z));
-    return root * root;
-}
-
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
 float lf_ggx_projection(vec3 w, float alpha) {
     float a2 = alpha * alpha;
     return sqrt(a2 + (1.0 - a2) * (w.z * w.z));
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division.
+float lf_ggx_lobe(vec3 wi, vec3 wo, vec3 h, float alpha) {
+    float a2 = alpha * alpha;
+    float e = dot(h.xy, h.xy) + a2 * (h.z * h.z);
+    float hidden = wo.z * lf_ggx_projection(wi, alpha) + wi.z * lf_ggx_projection(wo, alpha);
+    return 0.15915494 * a2 / (e * e * hidden);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -289,6 +286,11 @@ float lf_ggx_projection_anisotropic(vec3 w, float alpha_x, float alpha_y) {
     return sqrt(w.z * w.z + x * x + y * y);
 }
 
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
+}
+
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
 float lf_seen(vec3 yi, vec3 yo, float h2, vec2 width) {
     float M = yi.z + yo.z;
@@ -304,10 +306,6 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     Crossing crossing = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_lacquer.eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_lacquer.alpha);
-    float projection_i = lf_ggx_projection(wi, lf_lacquer.alpha);
-    float projection_o = lf_ggx_projection(wo, lf_lacquer.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_lacquer.eta * lf_lacquer.eta);
     vec2 own = vec2(lf_brass.alpha_x, lf_brass.alpha_y);
     float there = lf_presence(lf_lacquer.eta);
@@ -330,7 +328,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo) {
     vec3 lobes = rise * lf_lobe(crossing, crossing2, h.z, own) + again * lf_lobe(crossing, crossing2, h.z, lf_wider(own, lf_lacquer.alpha));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, sqrt(0.5 * (lf_brass.alpha_x * lf_brass.alpha_x + lf_brass.alpha_y * lf_brass.alpha_y)));
-    vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);
+    vec3 value = F * lf_ggx_lobe(wi, wo, lf_half_vector(wi, wo), lf_lacquer.alpha) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, own) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

@@ -206,21 +206,18 @@ vec3 lf_half_vector(vec3 wi, vec3 wo) {
     return s * inverse;
 }
 
-// GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(vec3 h, float alpha) {
-    float root = alpha * 0.5641896 / (dot(h.xy, h.xy) + alpha * alpha * (h.z * h.z));
-    return root * root;
-}
-
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
 float lf_ggx_projection(vec3 w, float alpha) {
     float a2 = alpha * alpha;
     return sqrt(a2 + (1.0 - a2) * (w.z * w.z));
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division.
+float lf_ggx_lobe(vec3 wi, vec3 wo, vec3 h, float alpha) {
+    float a2 = alpha * alpha;
+    float e = dot(h.xy, h.xy) + a2 * (h.z * h.z);
+    float hidden = wo.z * lf_ggx_projection(wi, alpha) + wi.z * lf_ggx_projection(wo, alpha);
+    return 0.15915494 * a2 / (e * e * hidden);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -326,7 +323,7 @@ float lf_beckmann_projection(vec3 w, float alpha) {
 }
 
 // G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
     return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
 }
 
@@ -337,11 +334,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     float lost = lf_lost_variance(distance, lf_flakes.half_distance);
     bool lit = min(wi.z, wo.z) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_candy.eta);
-    float D = lf_ggx_d(lf_half_vector(wi, wo), lf_candy.alpha);
-    float projection_i = lf_ggx_projection(wi, lf_candy.alpha);
-    float projection_o = lf_ggx_projection(wo, lf_candy.alpha);
-    float V = lf_v_smith(wi.z, wo.z, projection_i, projection_o);
-    float f = F * (D * V);
+    float f = F * lf_ggx_lobe(wi, wo, lf_half_vector(wi, wo), lf_candy.alpha);
     Crossing i = lf_cross(lf_candy_interface, lf_candy, wi, wi);
     Crossing o = lf_cross(lf_candy_interface, lf_candy, wo, wo);
     float throughput = i.T * o.T / (lf_candy.eta * lf_candy.eta);
@@ -371,9 +364,9 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     total = total + 2.0 * pow(lf_candy.alpha, 1.5);
     added = own2 * lf_expm1(1.3333334 * lf_log1p(total / pow(t, 1.5)));
     float alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
-    projection_i = lf_beckmann_projection(wi, width);
-    projection_o = lf_beckmann_projection(wo, width);
-    float lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith2(wi.z, wo.z, projection_i, projection_o);
+    float projection_i = lf_beckmann_projection(wi, width);
+    float projection_o = lf_beckmann_projection(wo, width);
+    float lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total = spread + 1.6817929 * pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
     total = total + pow(lf_candy.alpha, 1.5);
@@ -386,7 +379,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith2(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes = lobe + q * lobes;
     total = spread + pow(sqrt(lf_flakes.alpha * lf_flakes.alpha + lf_flakes.sigma * lf_flakes.sigma), 1.5);
     width = pow(total, 0.6666667);
@@ -397,7 +390,7 @@ vec3 lf_evaluate(vec3 wi, vec3 wo, vec2 uv, float distance) {
     alpha2 = lf_flakes.alpha * lf_flakes.alpha + lost * (lf_flakes.sigma * lf_flakes.sigma) + min(added, 2.25 - own2);
     projection_i = lf_beckmann_projection(wi, width);
     projection_o = lf_beckmann_projection(wo, width);
-    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith2(wi.z, wo.z, projection_i, projection_o);
+    lobe = lf_tilted_d(h, tilt, alpha2) * lf_v_smith(wi.z, wo.z, projection_i, projection_o);
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * (F2 * directional) * lobes;
     return lit ? f2 : vec3(0.0);

@@ -185,21 +185,18 @@ FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
     return FreeDirection(along * inverse, cosine * inverse);
 }
 
-// GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(FreeDirection h, float alpha) {
-    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
-    return root * root;
-}
-
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
 float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
     return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division.
+float lf_ggx_lobe(FreeDirection wi, FreeDirection wo, FreeDirection h, float alpha) {
+    float a2 = alpha * alpha;
+    float e = dot(h.along, h.along) + a2 * (h.cosine * h.cosine);
+    float hidden = wo.cosine * lf_ggx_projection(wi, alpha) + wi.cosine * lf_ggx_projection(wo, alpha);
+    return 0.15915494 * a2 / (e * e * hidden);
 }
 
 // 0 where the indices match and there is no interface, 1 from 1.15 on.
@@ -281,6 +278,11 @@ float lf_ahead(Crossing i, Crossing o, float alpha) {
     return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
+}
+
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
 float lf_seen(FreeDirection yi, FreeDirection yo, float h2, float width) {
     float M = yi.cosine + yo.cosine;
@@ -297,10 +299,6 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
     Crossing crossing2 = lf_pass_interface(lf_lacquer_interface, lf_lacquer.eta, lf_lacquer.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_lacquer.eta);
     FreeDirection direction = lf_half_vector(wi, wo);
-    float D = lf_ggx_d(direction, lf_lacquer.alpha);
-    float projection_i = lf_ggx_projection(wi, lf_lacquer.alpha);
-    float projection_o = lf_ggx_projection(wo, lf_lacquer.alpha);
-    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_lacquer.eta * lf_lacquer.eta);
     float there = lf_presence(lf_lacquer.eta);
     Shares shares = lf_split(crossing, crossing2, lf_aluminium.alpha);
@@ -322,7 +320,7 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
     vec3 lobes = rise * lf_lobe(crossing, crossing2, cosine, lf_aluminium.alpha) + again * lf_lobe(crossing, crossing2, cosine, lf_wider(lf_aluminium.alpha, lf_lacquer.alpha));
     vec3 root = lf_amount(lf_lacquer_rest, crossing.s) * lf_amount(lf_lacquer_rest, crossing2.s);
     vec3 rest = root * root * lf_ahead(crossing, crossing2, lf_aluminium.alpha);
-    vec3 value = F * (D * V) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);
+    vec3 value = F * lf_ggx_lobe(wi, wo, direction, lf_lacquer.alpha) + throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_aluminium.alpha) * lobes) + rest);
     return lit ? value : vec3(0.0);
 }
 

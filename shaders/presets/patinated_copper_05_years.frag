@@ -322,21 +322,18 @@ FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
     return FreeDirection(along * inverse, cosine * inverse);
 }
 
-// GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(FreeDirection h, float alpha) {
-    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
-    return root * root;
-}
-
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
 float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
     return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division.
+float lf_ggx_lobe(FreeDirection wi, FreeDirection wo, FreeDirection h, float alpha) {
+    float a2 = alpha * alpha;
+    float e = dot(h.along, h.along) + a2 * (h.cosine * h.cosine);
+    float hidden = wo.cosine * lf_ggx_projection(wi, alpha) + wi.cosine * lf_ggx_projection(wo, alpha);
+    return 0.15915494 * a2 / (e * e * hidden);
 }
 
 // Cosine between a direction and the facets that it meets.
@@ -577,11 +574,7 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo, vec2 uv) {
     bool lit2 = min(wi.cosine, wo.cosine) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_patina_coat.eta);
     FreeDirection direction = lf_half_vector(wi, wo);
-    float D = lf_ggx_d(direction, lf_patina_coat.alpha);
-    float projection_i = lf_ggx_projection(wi, lf_patina_coat.alpha);
-    float projection_o = lf_ggx_projection(wo, lf_patina_coat.alpha);
-    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
-    float f = F * (D * V);
+    float f = F * lf_ggx_lobe(wi, wo, direction, lf_patina_coat.alpha);
     Crossing i = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wi, wi);
     Crossing o = lf_cross(lf_patina_interface, Coat(lf_patina_coat.alpha, lf_patina_coat.eta, t, t2), wo, wo);
     float throughput = i.T * o.T / (lf_patina_coat.eta * lf_patina_coat.eta);
@@ -604,28 +597,16 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo, vec2 uv) {
     float total7 = spread + 3.0 * pow(lf_base.alpha, 1.34);
     total7 = total7 + 2.0 * pow(lf_patina_coat.alpha, 1.34);
     float width = pow(total7, 0.74626863);
-    D = lf_ggx_d(h, width);
-    projection_i = lf_ggx_projection(wi2, width);
-    projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.cosine, wo2.cosine, projection_i, projection_o);
-    float lobe = D * V;
+    float lobe = lf_ggx_lobe(wi2, wo2, h, width);
     vec3 lobes = lobe / max(1.0 - q, 1e-06);
     total7 = spread + 2.0 * pow(lf_base.alpha, 1.34);
     total7 = total7 + pow(lf_patina_coat.alpha, 1.34);
     width = pow(total7, 0.74626863);
-    D = lf_ggx_d(h, width);
-    projection_i = lf_ggx_projection(wi2, width);
-    projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.cosine, wo2.cosine, projection_i, projection_o);
-    lobe = D * V;
+    lobe = lf_ggx_lobe(wi2, wo2, h, width);
     lobes = lobe + q * lobes;
     total7 = spread + pow(lf_base.alpha, 1.34);
     width = pow(total7, 0.74626863);
-    D = lf_ggx_d(h, width);
-    projection_i = lf_ggx_projection(wi2, width);
-    projection_o = lf_ggx_projection(wo2, width);
-    V = lf_v_smith(wi2.cosine, wo2.cosine, projection_i, projection_o);
-    lobe = D * V;
+    lobe = lf_ggx_lobe(wi2, wo2, h, width);
     lobes = lobe + q * lobes;
     vec3 f2 = f + throughput * (F2 * directional) * lobes;
     float path = 1.0 / i.w_cosine;
@@ -648,11 +629,7 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo, vec2 uv) {
     patina = patina + diffuse;
     F2 = lf_fresnel_conductor2(lf_half_cosine(wi, wo), lf_base_bare.eta, lf_base_bare.k);
     direction = lf_half_vector(wi, wo);
-    D = lf_ggx_d(direction, lf_base_bare.alpha);
-    projection_i = lf_ggx_projection(wi, lf_base_bare.alpha);
-    projection_o = lf_ggx_projection(wo, lf_base_bare.alpha);
-    V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
-    vec3 bare = F2 * (D * V);
+    vec3 bare = F2 * lf_ggx_lobe(wi, wo, direction, lf_base_bare.alpha);
     f2 = cover.bare * bare + cover.covered * patina;
     return lit ? f2 : vec3(0.0);
 }

@@ -225,21 +225,18 @@ FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
     return FreeDirection(along * inverse, cosine * inverse);
 }
 
-// GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(FreeDirection h, float alpha) {
-    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
-    return root * root;
-}
-
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
 float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
     return sqrt(max(a2 + (1.0 - a2) * (w.cosine * w.cosine), 0.0));
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / max(NoV * projection_l + NoL * projection_v, 1e-14);
+// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division.
+float lf_ggx_lobe(FreeDirection wi, FreeDirection wo, FreeDirection h, float alpha) {
+    float a2 = alpha * alpha;
+    float e = dot(h.along, h.along) + a2 * (h.cosine * h.cosine);
+    float hidden = wo.cosine * lf_ggx_projection(wi, alpha) + wi.cosine * lf_ggx_projection(wo, alpha);
+    return 0.15915494 * a2 / (e * e * hidden);
 }
 
 // 1 - fresnel_dielectric, with its own digits where the reflectance is near 1 (grazing); 0 under total internal reflection.
@@ -280,9 +277,12 @@ float lf_ggx_projection2(FreeDirection w, float alpha) {
     return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith2(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division.
+float lf_ggx_lobe2(FreeDirection wi, FreeDirection wo, FreeDirection h, float alpha) {
+    float a2 = alpha * alpha;
+    float e = dot(h.along, h.along) + a2 * (h.cosine * h.cosine);
+    float hidden = wo.cosine * lf_ggx_projection2(wi, alpha) + wi.cosine * lf_ggx_projection2(wo, alpha);
+    return 0.15915494 * a2 / (e * e * hidden);
 }
 
 // BRDF [1/sr] of unit directions, each its part along the surface and its cosine; without the cosine.
@@ -315,19 +315,11 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo, vec2 uv) {
     albedo = lf_kubelka_munk_over2(layer, albedo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), eta);
     FreeDirection direction = lf_half_vector(wi, wo);
-    float D = lf_ggx_d(direction, alpha);
-    float projection_i = lf_ggx_projection(wi, alpha);
-    float projection_o = lf_ggx_projection(wo, alpha);
-    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
-    float boundary = F * (D * V);
+    float boundary = F * lf_ggx_lobe(wi, wo, direction, alpha);
     vec3 body = lf_below_boundary(wi, wo, eta, escape, albedo);
     vec3 F2 = lf_fresnel_conductor(lf_half_cosine(wi, wo), lf_brass.eta, lf_brass.k);
     direction = lf_half_vector(wi, wo);
-    D = lf_ggx_d(direction, lf_brass.alpha);
-    projection_i = lf_ggx_projection2(wi, lf_brass.alpha);
-    projection_o = lf_ggx_projection2(wo, lf_brass.alpha);
-    V = lf_v_smith2(wi.cosine, wo.cosine, projection_i, projection_o);
-    vec3 metal = F2 * (D * V);
+    vec3 metal = F2 * lf_ggx_lobe2(wi, wo, direction, lf_brass.alpha);
     vec3 f = covered * (boundary + body) + bare * metal;
     return lit ? f : vec3(0.0);
 }

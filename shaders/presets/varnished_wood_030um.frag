@@ -164,21 +164,18 @@ FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
     return FreeDirection(along * inverse, cosine * inverse);
 }
 
-// GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(FreeDirection h, float alpha) {
-    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
-    return root * root;
-}
-
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
 float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
     return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division.
+float lf_ggx_lobe(FreeDirection wi, FreeDirection wo, FreeDirection h, float alpha) {
+    float a2 = alpha * alpha;
+    float e = dot(h.along, h.along) + a2 * (h.cosine * h.cosine);
+    float hidden = wo.cosine * lf_ggx_projection(wi, alpha) + wi.cosine * lf_ggx_projection(wo, alpha);
+    return 0.15915494 * a2 / (e * e * hidden);
 }
 
 // How the spread of paths shows at depth tau, 1 where all are alike: of an inverse Gaussian (Tweedie 1957).
@@ -227,14 +224,10 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
     Crossing crossing2 = lf_pass_interface(lf_varnish_interface, lf_varnish.eta, lf_varnish.alpha, wo);
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_varnish.eta);
     FreeDirection direction = lf_half_vector(wi, wo);
-    float D = lf_ggx_d(direction, lf_varnish.alpha);
-    float projection_i = lf_ggx_projection(wi, lf_varnish.alpha);
-    float projection_o = lf_ggx_projection(wo, lf_varnish.alpha);
-    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     float throughput = crossing.T * crossing2.T / (lf_varnish.eta * lf_varnish.eta);
     vec3 once = lf_varnish.tau + (crossing.path - 1.0) * (2.0 * lf_varnish.tau / (1.0 + lf_spread_root(crossing.theta, lf_varnish.tau)));
     vec3 throughput2 = throughput * exp(-(once + (lf_varnish.tau + (crossing2.path - 1.0) * (2.0 * lf_varnish.tau / (1.0 + lf_spread_root(crossing2.theta, lf_varnish.tau))))));
-    vec3 value = F * (D * V) + throughput2 * lf_oren_nayar_full(FreeDirection(crossing.w_along, crossing.w_cosine), FreeDirection(crossing2.w_along, crossing2.w_cosine), lf_wood.albedo, lf_wood.sigma) / (1.0 - lf_wood.albedo * lf_wood_returned);
+    vec3 value = F * lf_ggx_lobe(wi, wo, direction, lf_varnish.alpha) + throughput2 * lf_oren_nayar_full(FreeDirection(crossing.w_along, crossing.w_cosine), FreeDirection(crossing2.w_along, crossing2.w_cosine), lf_wood.albedo, lf_wood.sigma) / (1.0 - lf_wood.albedo * lf_wood_returned);
     return lit ? value : vec3(0.0);
 }
 

@@ -125,9 +125,12 @@ float lf_ggx_projection(FreeDirection w, float alpha) {
     return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division.
+float lf_ggx_lobe(FreeDirection wi, FreeDirection wo, FreeDirection h, float alpha) {
+    float a2 = alpha * alpha;
+    float e = dot(h.along, h.along) + a2 * (h.cosine * h.cosine);
+    float hidden = wo.cosine * lf_ggx_projection(wi, alpha) + wi.cosine * lf_ggx_projection(wo, alpha);
+    return 0.15915494 * a2 / (e * e * hidden);
 }
 
 // Bouguer, Lambert and Beer: what remains after `path` times the optical depth at normal incidence.
@@ -150,11 +153,7 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
     float T12 = lf_transmittance_dielectric(c, lf_coat.eta);
     float t = 1.0 - 4.0 * wi.cosine * (F * V * wo.cosine);
     bool lit2 = min(wi_below.cosine, wo_below.cosine) > 1e-07;
-    D = lf_ggx_d(h, lf_base.alpha);
-    float projection_i = lf_ggx_projection(wi_below, lf_base.alpha);
-    float projection_o = lf_ggx_projection(wo_below, lf_base.alpha);
-    V = lf_v_smith(wi_below.cosine, wo_below.cosine, projection_i, projection_o);
-    vec3 rest = T12 * t * (lf_fresnel_conductor(c_below, lf_base.eta, lf_base.k) * (D * V));
+    vec3 rest = T12 * t * (lf_fresnel_conductor(c_below, lf_base.eta, lf_base.k) * lf_ggx_lobe(wi_below, wo_below, h, lf_base.alpha));
     float path = (wi_below.cosine + wo_below.cosine) / (wi_below.cosine * wo_below.cosine);
     rest = rest * lf_transmittance(lf_coat.tau, path);
     vec3 value = top + rest;

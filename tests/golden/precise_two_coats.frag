@@ -189,21 +189,18 @@ FreeDirection lf_half_vector(FreeDirection wi, FreeDirection wo) {
     return FreeDirection(along * inverse, cosine * inverse);
 }
 
-// GGX density of facet normals (Walter et al. 2007, eq. 33).
-float lf_ggx_d(FreeDirection h, float alpha) {
-    float root = alpha * 0.5641896 / (dot(h.along, h.along) + alpha * alpha * (h.cosine * h.cosine));
-    return root * root;
-}
-
 // NoW (1 + 2 Lambda) of the GGX distribution (Heitz 2014, eq. 72, multiplied out).
 float lf_ggx_projection(FreeDirection w, float alpha) {
     float a2 = alpha * alpha;
     return sqrt(a2 + (1.0 - a2) * (w.cosine * w.cosine));
 }
 
-// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
-float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
-    return 0.5 / (NoV * projection_l + NoL * projection_v);
+// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division.
+float lf_ggx_lobe(FreeDirection wi, FreeDirection wo, FreeDirection h, float alpha) {
+    float a2 = alpha * alpha;
+    float e = dot(h.along, h.along) + a2 * (h.cosine * h.cosine);
+    float hidden = wo.cosine * lf_ggx_projection(wi, alpha) + wi.cosine * lf_ggx_projection(wo, alpha);
+    return 0.15915494 * a2 / (e * e * hidden);
 }
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.
@@ -323,6 +320,11 @@ float lf_ahead(Crossing i, Crossing o, float alpha) {
     return (alpha + (1.0 - alpha) * back) / 3.1415927;
 }
 
+// G / (4 NoL NoV), height-correlated Smith masking (Heitz 2014, eq. 99).
+float lf_v_smith(float NoL, float NoV, float projection_l, float projection_v) {
+    return 0.5 / (NoV * projection_l + NoL * projection_v);
+}
+
 // Part of a density of facets that is seen and hides nothing, without the projected areas; h2 is the square of the sum of both directions.
 float lf_seen(FreeDirection yi, FreeDirection yo, float h2, float width) {
     float M = yi.cosine + yo.cosine;
@@ -352,10 +354,6 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
     bool lit = min(wi.cosine, wo.cosine) > 1e-07;
     float F = lf_fresnel_dielectric(lf_half_cosine(wi, wo), lf_coat.eta);
     FreeDirection direction = lf_half_vector(wi, wo);
-    float D = lf_ggx_d(direction, lf_coat.alpha);
-    float projection_i = lf_ggx_projection(wi, lf_coat.alpha);
-    float projection_o = lf_ggx_projection(wo, lf_coat.alpha);
-    float V = lf_v_smith(wi.cosine, wo.cosine, projection_i, projection_o);
     Crossing crossing = lf_pass_interface(lf_coat_top, lf_coat.eta, lf_coat.alpha, wi);
     Crossing crossing2 = lf_pass_interface(lf_coat_top, lf_coat.eta, lf_coat.alpha, wo);
     Crossing crossing3 = lf_pass_interface(lf_coat_both, lf_coat.eta, 1.0, wi);
@@ -367,11 +365,11 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
     there = lf_presence(lf_coat.eta * lf_primer.eta);
     Shares shares = lf_split(crossing3, crossing4, lf_base.alpha);
     float part = 0.7911 * shares.base;
-    direction = lf_lean(crossing3, crossing3, crossing4, there * shares.i);
-    FreeDirection y = lf_upwards(direction, lf_primer.eta);
+    FreeDirection direction2 = lf_lean(crossing3, crossing3, crossing4, there * shares.i);
+    FreeDirection y = lf_upwards(direction2, lf_primer.eta);
     vec3 left = lf_coat.tau + (lf_between(y, crossing, part) - 1.0) * (2.0 * lf_coat.tau / (1.0 + lf_spread_root(part * crossing.theta, lf_coat.tau)));
-    direction = lf_lean(crossing4, crossing3, crossing4, there * shares.o);
-    y = lf_upwards(direction, lf_primer.eta);
+    direction2 = lf_lean(crossing4, crossing3, crossing4, there * shares.o);
+    y = lf_upwards(direction2, lf_primer.eta);
     left = left + (lf_coat.tau + (lf_between(y, crossing2, part) - 1.0) * (2.0 * lf_coat.tau / (1.0 + lf_spread_root(part * crossing2.theta, lf_coat.tau))));
     kept = kept * exp(-left);
     float throughput = crossing.T * crossing2.T / (lf_coat.eta * lf_coat.eta);
@@ -416,7 +414,7 @@ vec3 lf_evaluate(FreeDirection wi, FreeDirection wo) {
     vec3 lobes2 = rise * lf_lobe(crossing3, crossing4, cosine, lf_base.alpha) + again * lf_lobe(crossing3, crossing4, cosine, lf_wider(lf_base.alpha, alpha));
     root = lf_amount(lf_coat_rest, crossing3.s) * lf_amount(lf_coat_rest, crossing4.s);
     vec3 rest2 = root * root * lf_ahead(crossing3, crossing4, lf_base.alpha);
-    vec3 value = F * (D * V) + (throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_primer.alpha) * lobes) + rest) + kept * (throughput3 * (F3 * U2 * (lf_seen(yi2, yo2, h22, lf_base.alpha) * lobes2) + rest2)));
+    vec3 value = F * lf_ggx_lobe(wi, wo, direction, lf_coat.alpha) + (throughput2 * (F2 * U * (lf_seen(yi, yo, h2, lf_primer.alpha) * lobes) + rest) + kept * (throughput3 * (F3 * U2 * (lf_seen(yi2, yo2, h22, lf_base.alpha) * lobes2) + rest2)));
     return lit ? value : vec3(0.0);
 }
 

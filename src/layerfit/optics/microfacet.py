@@ -13,7 +13,7 @@ from typing import Any, Literal
 import jax
 import jax.numpy as jnp
 
-from .._chunk import chunk, safe_divide, safe_sqrt, where
+from .._chunk import chunk, divide, safe_divide, safe_sqrt, where
 from .._types import Direction, Scalar, Vec3
 from .directions import product, sine2
 
@@ -149,6 +149,24 @@ def visibility(masking: Masking, distribution: Distribution, wi: Direction, wo: 
     projection_i = projection(distribution, wi, alpha)
     projection_o = projection(distribution, wo, alpha)
     return (v_smith if masking == "smith" else v_smith_separable)(wi[-1], wo[-1], projection_i, projection_o)
+
+
+@chunk
+def ggx_lobe(wi: Direction, wo: Direction, h: Direction, alpha: Scalar) -> Scalar:
+    """D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division."""
+    a2 = alpha * alpha
+    e = sine2(h) + a2 * (h[-1] * h[-1])
+    hidden = wo[-1] * ggx_projection(wi, alpha) + wi[-1] * ggx_projection(wo, alpha)
+    return divide(0.5 * _INV_PI * a2, e * e * hidden)
+
+
+def lobe(distribution: Distribution, masking: Masking, wi: Direction, wo: Direction, h: Direction, alpha: Width) -> Scalar:
+    """D V [1/sr], the part of a reflection lobe that is not its colour."""
+    if (distribution, masking) == ("ggx", "smith") and not isinstance(alpha, tuple):
+        return ggx_lobe(wi, wo, h, alpha)
+    D = density(distribution, h, alpha)
+    V = visibility(masking, distribution, wi, wo, alpha)
+    return D * V
 
 
 @chunk

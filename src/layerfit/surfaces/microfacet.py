@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from .._chunk import chunk, static
 from .._fields import choice, layer, param
 from .._types import Colour, Direction, Number, Scalar
-from ..optics.microfacet import Distribution, Masking, Width, density, half_cosine, half_vector, visibility
+from ..optics.microfacet import Distribution, Masking, Width, density, half_cosine, half_vector, lobe, visibility
 from .base import Lobe, Surface
 from .facet import Clear, Fresnel, Metal, fresnel_choice, lazanyi_a, lazanyi_alpha, metal_eta, metal_k
 from .film import Filmed, baked_f0, film_eta, film_nm, film_reflects
@@ -41,16 +41,12 @@ class Microfacets(Surface, Lobe):
 
     def shape(self, wi: Direction, wo: Direction, h: Direction, width: Width | None = None) -> Scalar:
         """D V."""
-        D = self.density(h, width)
-        V = self.visibility(wi, wo, width)
-        return D * V
+        return lobe(self.distribution, self.masking, wi, wo, h, self.width if width is None else width)
 
     def evaluate(self, wi: Direction, wo: Direction) -> Colour:
         """F D V [1/sr] of directions above the surface (Cook and Torrance 1982; Walter et al. 2007, eq. 20)."""
         F = self.reflectance(half_cosine(wi, wo))
-        D = self.density(half_vector(wi, wo))
-        V = self.visibility(wi, wo)
-        return F * (D * V)
+        return F * self.shape(wi, wo, half_vector(wi, wo))
 
 
 def alpha_param(*, default: float | None, which: str) -> Any:
