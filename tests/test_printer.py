@@ -292,7 +292,10 @@ def test_the_text_reads_as_written_by_hand():
     text = print_material(STACKS["corrected over conductor"], "lacquered copper").text()
     assert "float lf_fresnel_dielectric(float c, float eta) {" in text
     assert "    float delta = (eta - 1.0) * (eta + 1.0);" in text
-    assert "// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division." in text
+    assert (
+        "// D V, the GGX density (Walter et al. 2007, eq. 33) and height-correlated Smith masking (Heitz 2014, eq. 99), by one division."
+        in text
+    )
     assert "const Coat lf_coat = Coat(" in text
     assert re.search(r"0\.1, +// alpha: width of the facet slopes", text)
     assert not re.search(r"\bt\d*\b = ", text), "a local without a name"
