@@ -202,6 +202,7 @@ DOMAINS: dict[Any, dict[str, Any]] = {
         "beckmann_d_anisotropic": (microfacet.beckmann_d_anisotropic, (W, ALPHA, ALPHA), POSITIVE),
         "beckmann_by_slopes": (microfacet.beckmann_by_slopes, (number(0.0, 1e6, "softlog"), UNIT, ALPHA), POSITIVE),
         "ggx_lambda": (microfacet.ggx_lambda, (number(0.0, 1e8, "softlog"),), POSITIVE),
+        "ggx_lobe": (microfacet.ggx_lobe, (LIT, LIT, W, ALPHA), POSITIVE),
         "ggx_projection": (microfacet.ggx_projection, (W, ALPHA), FULL),
         "ggx_projection_anisotropic": (microfacet.ggx_projection_anisotropic, (W, ALPHA, ALPHA), FULL),
         "beckmann_projection": (microfacet.beckmann_projection, (W, ALPHA), (0.0, 1.3)),
@@ -239,7 +240,7 @@ DOMAINS: dict[Any, dict[str, Any]] = {
 ELSEWHERE = {
     directions: {"both_above"},  # a condition: with `above`
     lazanyi: {"fit_lazanyi"},  # in test_properties
-    microfacet: {"density", "projection", "visibility"},  # each by the names that it takes
+    microfacet: {"density", "lobe", "projection", "visibility"},  # each by the names that it takes
     spectra: {"covers", "resample", "resampling", "delta_e", "absorption_rgb"},  # below, and in test_properties
 }
 """Formulas that are tried in another way."""
