@@ -23,7 +23,7 @@ from layerfit.capture.samples import Samples
 from layerfit.capture.scene import Camera, Sphere
 from layerfit.fit.blocks import arrange, weighted
 from layerfit.fit.parameters import parametrise
-from layerfit.fit.residuals import NEAR, Residuals, initial
+from layerfit.fit.residuals import NEAR, SEARCHED, Residuals, initial
 from layerfit.forms.corrected import Corrected
 from layerfit.layers import Coat
 from layerfit.render import predict
@@ -74,8 +74,8 @@ class Ours:
     def fit(self) -> tuple[np.ndarray, float, int]:
         # As every fit does: to a minimum of a sample of the pixels first, then of all.
         u, steps, state = self.free.pack(self.residuals.start), 0, None
-        for count, trust in ((2, 1.0), (None, NEAR)):
-            u, state, losses = self.residuals.steps(u, initial(u, trust), self.free.bounds(), count)
+        for count, trust, gain in ((2, 1.0, SEARCHED), (None, NEAR, None)):
+            u, state, losses = self.residuals.steps(u, initial(u, trust, gain), self.free.bounds(), count)
             steps += int(np.sum(~np.isnan(losses)))
         return np.concatenate([np.atleast_1d(v) for v in self.free.values(np.asarray(u)).values()]), float(state.loss), steps
 

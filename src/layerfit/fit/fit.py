@@ -19,7 +19,7 @@ from .asked import what_is_asked
 from .nuisances import THICKNESS
 from .problem import Problem
 from .profile import ABSORBING, Profile, along, deep, lower_limit, scatter, threshold
-from .residuals import NEAR
+from .residuals import NEAR, SEARCHED
 from .result import FitResult
 from .starts import (
     COARSE_STEPS,
@@ -153,7 +153,7 @@ class _Fit:
         def descend(at: Sequence[Minimum], stage: str) -> Iterator[Minimum]:
             coarse = stage == "coarse"
             most, trust = (COARSE_STEPS, 1.0) if coarse else (FINE_STEPS, NEAR)
-            return (reached for reached, _ in problem.descend(at, stage, most, few, trust))
+            return (reached for reached, _ in problem.descend(at, stage, most, few, trust, SEARCHED))
 
         level = LEVEL * problem.shine(few)
         return search(self._points(views), descend, level, lambda share: self.progress("coarse", share))

@@ -167,10 +167,16 @@ class Problem:
         return [part.light(part.fields(self.free.taken(np.asarray(u), k, np)), np) for k in range(len(self.views))]
 
     def descend(
-        self, at: Sequence[Minimum], stage: str, most: int, count: int | None = None, trust: float = NEAR
+        self,
+        at: Sequence[Minimum],
+        stage: str,
+        most: int,
+        count: int | None = None,
+        trust: float = NEAR,
+        gain: float | None = None,
     ) -> Iterator[tuple[Minimum, bool]]:
         """Run the solver from some points, side by side, on some blocks; gives where each comes to, and whether it converged."""
-        begun = [_Descent(self, point, stage, most, count or self.count, trust) for point in at]
+        begun = [_Descent(self, point, stage, most, count or self.count, trust, gain) for point in at]
         return (descent.ended() for descent in begun)
 
     def shine(self, count: int | None = None) -> float:
@@ -228,11 +234,11 @@ def told_apart(free: Parametrisation, samples: Sequence[Samples]) -> tuple[str, 
 class _Descent:
     """The solver on its way from a point: a few steps at a time, so that it can be told of and interrupted."""
 
-    def __init__(self, problem: Problem, at: Minimum, stage: str, most: int, count: int, trust: float):
+    def __init__(self, problem: Problem, at: Minimum, stage: str, most: int, count: int, trust: float, gain: float | None):
         self.problem, self.at, self.stage, self.left, self.count = problem, at, stage, most, count
         self.residuals = problem.residuals
         self.u = np.asarray(at.vector, float)
-        self.state = initial(self.u, trust)
+        self.state = initial(self.u, trust, gain)
         self.taken = 0
         _, pixels, lights, _ = problem.blocks.wi.shape
         self.at_once = int(np.clip(AT_ONCE // (count * pixels * lights), 1, LONGEST))

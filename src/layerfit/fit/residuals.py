@@ -149,6 +149,12 @@ NEAR = 1e4
 """Trust in the first step from a point that is near a minimum: nearly that of Gauss and Newton."""
 
 
-def initial(u: Any, trust: Any = 1.0, solver: Any = SOLVER) -> Any:
-    """State of the solver before its first step at `u`; `trust` is the inverse of its damping."""
-    return solver.init(None, u, None, {"trust": trust}, None, None, frozenset())
+SEARCHED = 1e-5
+"""Part of the loss that a step has to promise in a search on few pixels: the others move its end much further."""
+
+
+def initial(u: Any, trust: Any = 1.0, gain: float | None = None, solver: Any = SOLVER) -> Any:
+    """State of the solver before its first step at `u`; `trust` is the inverse of its damping, `gain` the part of the loss that a step has to
+    promise, where it is not the solver's own."""
+    options = {"trust": trust} if gain is None else {"trust": trust, "gain": gain}
+    return solver.init(None, u, None, options, None, None, frozenset())

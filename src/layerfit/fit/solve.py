@@ -91,6 +91,7 @@ class _State(eqx.Module):
     gram: Any
     search: Any
     step_size: Any
+    gain: Any
     done: Any
     result: Any
 
@@ -107,7 +108,8 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     rtol: float = 1e-5
     atol: float = 1e-6
     gain: float = 1e-8
-    """Part of the loss that a step has to promise to be worth taking: far less than noise can tell apart."""
+    """Part of the loss that a step has to promise to be worth taking, where `options["gain"]` says nothing else: far less than noise can
+    tell apart."""
     least: float = 1e-9
     """Trust below which no step is taken."""
     landing: float = 1e-3
@@ -117,7 +119,8 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     search: optx.AbstractSearch = optx.ClassicalTrustRegion()
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):
-        return begun(at_rest(self, y.size), y, np.asarray(options.get("trust", 1.0), float))
+        state = begun(at_rest(self, y.size), y, np.asarray(options.get("trust", 1.0), float))
+        return dataclasses.replace(state, gain=np.asarray(options.get("gain", self.gain), float))
 
     def step(self, fn, y, args, options, state, tags):
         lower, upper = options["lower"], options["upper"]
@@ -145,7 +148,7 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
         kept_in = lambda by: jnp.where(lands, edge, jnp.clip(y + by, lower, upper)) - y  # noqa: E731
         promise = lambda by: -(gradient @ by + 0.5 * by @ gram @ by)  # noqa: E731
         first = step(step_size)
-        done = done | (promise(first) <= self.gain * loss) | ~jnp.isfinite(loss)
+        done = done | (promise(first) <= state.gain * loss) | ~jnp.isfinite(loss)
         # Cut off at the bounds, a step can lead uphill. A shorter one is nearer to the gradient, and in the end does not.
         step_size, move = lax.while_loop(
             lambda at: (promise(at[1]) <= 0.0) & (at[0] > self.least) & ~done,
@@ -155,7 +158,7 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
         done = done | (step_size <= self.least)
         y_eval = y + move
         search = eqx.tree_at(lambda s: s.step_size, search, step_size)
-        state = _State(jnp.array(False), y_eval, loss, gradient, gram, search, step_size, done, result)
+        state = _State(jnp.array(False), y_eval, loss, gradient, gram, search, step_size, state.gain, done, result)
         return y, state, (gradient, gram)
 
     def _info(self, loss, gradient, gram):
@@ -241,6 +244,7 @@ def at_rest(solver: NormalLevenbergMarquardt, n: int) -> _State:
             gram=np.eye(n),
             search=jax.tree.map(lambda a: np.zeros(a.shape, a.dtype), search),
             step_size=zero,
+            gain=np.array(solver.gain),
             done=np.array(False),
             result=optx.RESULTS.successful,
         )
