@@ -20,13 +20,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Conductor {
@@ -37,11 +37,11 @@ struct Conductor {
 
 struct Curve {
     vec3 c0;  // coefficients of the powers of the curves' argument
-    vec3 c1;  // 
-    vec3 c2;  // 
-    vec3 c3;  // 
-    vec3 c4;  // 
-    vec3 c5;  // 
+    vec3 c1;
+    vec3 c2;
+    vec3 c3;
+    vec3 c4;
+    vec3 c5;
 };
 
 struct FreeDirection {
@@ -79,13 +79,13 @@ const Interface lf_shellac_interface = Interface(
     vec4(-0.024019195, 0.037430365, -0.012146365, -0.008774286),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.01589695, -0.00900097),                                // passed_high: the other two, of higher powers
     vec4(0.33006918, 0.021768995, -0.018093288, 0.013072789),     // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0058472306, 0.0002579987),                            // bend_high: 
+    vec2(-0.0058472306, 0.0002579987),                            // bend_high
     vec4(0.6123964, -0.28842166, 0.24142314, -0.31251183),        // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.0021076351, 0.05370462),                               // spread_high: 
+    vec2(0.0021076351, 0.05370462),                               // spread_high
     vec4(1.041125, -0.086186826, 0.086508214, -0.056506038),      // path: mean path over that of the refracted direction
-    vec2(-0.0011351705, 0.017382026),                             // path_high: 
+    vec2(-0.0011351705, 0.017382026),                             // path_high
     vec4(0.09075124, -0.2020707, 0.24339886, -0.256472),          // theta: scale of the path's distribution
-    vec2(0.061698347, 0.08315918)                                 // theta_high: 
+    vec2(0.061698347, 0.08315918)                                 // theta_high
 );
 
 const Conductor lf_gold = Conductor(
@@ -96,20 +96,20 @@ const Conductor lf_gold = Conductor(
 
 const Curve lf_shellac_again = Curve(
     vec3(0.41007033, 0.36309215, 0.2537688),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.01659469, -0.014080793, -0.008570049),  // c1: 
-    vec3(0.05046711, 0.045693308, 0.030768678),     // c2: 
-    vec3(0.0075012445, 0.005959958, 0.0017178655),  // c3: 
-    vec3(-0.12749663, -0.11129109, -0.07341492),    // c4: 
-    vec3(-0.10804489, -0.093536645, -0.059924096)   // c5: 
+    vec3(-0.01659469, -0.014080793, -0.008570049),  // c1
+    vec3(0.05046711, 0.045693308, 0.030768678),     // c2
+    vec3(0.0075012445, 0.005959958, 0.0017178655),  // c3
+    vec3(-0.12749663, -0.11129109, -0.07341492),    // c4
+    vec3(-0.10804489, -0.093536645, -0.059924096)   // c5
 );
 
 const Curve lf_shellac_rest = Curve(
     vec3(0.9396438, 0.62593496, 0.29271707),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.07062769, -0.047082566, -0.022610608),  // c1: 
-    vec3(0.025603369, 0.014388591, 0.0050966144),   // c2: 
-    vec3(0.0273934, 0.017851233, 0.011184663),      // c3: 
-    vec3(-0.1832937, -0.12210363, -0.06094332),     // c4: 
-    vec3(-0.19600457, -0.13269022, -0.06895977)     // c5: 
+    vec3(-0.07062769, -0.047082566, -0.022610608),  // c1
+    vec3(0.025603369, 0.014388591, 0.0050966144),   // c2
+    vec3(0.0273934, 0.017851233, 0.011184663),      // c3
+    vec3(-0.1832937, -0.12210363, -0.06094332),     // c4
+    vec3(-0.19600457, -0.13269022, -0.06895977)     // c5
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.

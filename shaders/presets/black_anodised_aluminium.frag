@@ -21,13 +21,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Conductor {
@@ -39,11 +39,11 @@ struct Conductor {
 
 struct Curve {
     vec3 c0;  // coefficients of the powers of the curves' argument
-    vec3 c1;  // 
-    vec3 c2;  // 
-    vec3 c3;  // 
-    vec3 c4;  // 
-    vec3 c5;  // 
+    vec3 c1;
+    vec3 c2;
+    vec3 c3;
+    vec3 c4;
+    vec3 c5;
 };
 
 struct Crossing {
@@ -75,13 +75,13 @@ const Interface lf_oxide_interface = Interface(
     vec4(-0.03604947, 0.010694278, 0.02764687, 0.0047039147),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.007703439, -0.0034511923),                         // passed_high: the other two, of higher powers
     vec4(0.33516556, 0.08270949, -0.027979031, -0.006939888),  // bend: part by which the sine of light becomes smaller below
-    vec2(0.0068604946, -0.0014256835),                         // bend_high: 
+    vec2(0.0068604946, -0.0014256835),                         // bend_high
     vec4(0.6901757, -0.35035494, 0.07350148, 0.05722767),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.08315079, -0.035616696),                           // spread_high: 
+    vec2(-0.08315079, -0.035616696),                           // spread_high
     vec4(1.1375977, -0.2171973, 0.07142246, 0.036595583),      // path: mean path over that of the refracted direction
-    vec2(-0.02201134, -0.001537323),                           // path_high: 
+    vec2(-0.02201134, -0.001537323),                           // path_high
     vec4(0.41057786, -0.7462359, 0.3733016, 0.0021906942),     // theta: scale of the path's distribution
-    vec2(-0.08426255, 0.08728502)                              // theta_high: 
+    vec2(-0.08426255, 0.08728502)                              // theta_high
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -93,20 +93,20 @@ const Conductor lf_aluminium = Conductor(
 
 const Curve lf_oxide_again = Curve(
     vec3(0.1051283, 0.10233161, 0.096925735),       // c0: coefficients of the powers of the curves' argument
-    vec3(0.003977226, 0.0039688814, 0.003958853),   // c1: 
-    vec3(0.003590621, 0.00353764, 0.0034353547),    // c2: 
-    vec3(0.015053451, 0.01464209, 0.013852745),     // c3: 
-    vec3(-0.01022467, -0.009831402, -0.009081386),  // c4: 
-    vec3(-0.018423066, -0.01781261, -0.01664561)    // c5: 
+    vec3(0.003977226, 0.0039688814, 0.003958853),   // c1
+    vec3(0.003590621, 0.00353764, 0.0034353547),    // c2
+    vec3(0.015053451, 0.01464209, 0.013852745),     // c3
+    vec3(-0.01022467, -0.009831402, -0.009081386),  // c4
+    vec3(-0.018423066, -0.01781261, -0.01664561)    // c5
 );
 
 const Curve lf_oxide_rest = Curve(
     vec3(0.24074857, 0.23902494, 0.23320921),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0042296164, -0.004249595, -0.0042067617),  // c1: 
-    vec3(0.0035166293, 0.0036134645, 0.0037835091),    // c2: 
-    vec3(0.023409754, 0.02358687, 0.023740351),        // c3: 
-    vec3(-0.026114613, -0.02594255, -0.025363632),     // c4: 
-    vec3(-0.036583394, -0.036527455, -0.036093116)     // c5: 
+    vec3(-0.0042296164, -0.004249595, -0.0042067617),  // c1
+    vec3(0.0035166293, 0.0036134645, 0.0037835091),    // c2
+    vec3(0.023409754, 0.02358687, 0.023740351),        // c3
+    vec3(-0.026114613, -0.02594255, -0.025363632),     // c4
+    vec3(-0.036583394, -0.036527455, -0.036093116)     // c5
 );
 
 const Interface lf_oxide_across = Interface(
@@ -115,13 +115,13 @@ const Interface lf_oxide_across = Interface(
     vec4(-0.0848371, 0.031376388, -0.008033876, 0.03345237),   // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.01668107, -0.007443741),                            // passed_high: the other two, of higher powers
     vec4(0.22314383, 0.10226743, 0.048828423, 0.006305933),    // bend: part by which the sine of light becomes smaller below
-    vec2(-0.013409704, -0.0079526305),                         // bend_high: 
+    vec2(-0.013409704, -0.0079526305),                         // bend_high
     vec4(0.49460143, -0.023766257, -0.05786392, -0.03701365),  // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.021576107, -0.011080474),                          // spread_high: 
+    vec2(-0.021576107, -0.011080474),                          // spread_high
     vec4(1.2852762, -0.26076218, -0.07334012, 0.042782903),    // path: mean path over that of the refracted direction
-    vec2(0.026287615, -6.0915947e-05),                         // path_high: 
+    vec2(0.026287615, -6.0915947e-05),                         // path_high
     vec4(0.9425542, -1.0819294, -0.15661979, 0.31639296),      // theta: scale of the path's distribution
-    vec2(0.092320696, -0.033271924)                            // theta_high: 
+    vec2(0.092320696, -0.033271924)                            // theta_high
 );
 
 // How much of a rough top's effect on light is by slopes along the tangent: half of it at the normal, all along the tangent.

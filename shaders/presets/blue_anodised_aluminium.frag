@@ -20,13 +20,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Conductor {
@@ -37,11 +37,11 @@ struct Conductor {
 
 struct Curve {
     vec3 c0;  // coefficients of the powers of the curves' argument
-    vec3 c1;  // 
-    vec3 c2;  // 
-    vec3 c3;  // 
-    vec3 c4;  // 
-    vec3 c5;  // 
+    vec3 c1;
+    vec3 c2;
+    vec3 c3;
+    vec3 c4;
+    vec3 c5;
 };
 
 struct FreeDirection {
@@ -79,13 +79,13 @@ const Interface lf_oxide_interface = Interface(
     vec4(-0.04464719, 0.00010519335, 0.016922252, 0.03386515),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0017023832, -0.012983762),                          // passed_high: the other two, of higher powers
     vec4(0.29142344, 0.108710535, 0.0025622249, -0.022341251),  // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0025453418, 0.003545463),                           // bend_high: 
+    vec2(-0.0025453418, 0.003545463),                           // bend_high
     vec4(0.6386317, -0.20964563, -0.06772351, 0.04993409),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.018743232, -0.0422557),                             // spread_high: 
+    vec2(-0.018743232, -0.0422557),                             // spread_high
     vec4(1.204827, -0.25680122, 0.002035737, 0.06922245),       // path: mean path over that of the refracted direction
-    vec2(0.0030804276, -0.012909889),                           // path_high: 
+    vec2(0.0030804276, -0.012909889),                           // path_high
     vec4(0.6451652, -0.96579504, 0.16259342, 0.2337165),        // theta: scale of the path's distribution
-    vec2(-0.020245273, 0.0012745932)                            // theta_high: 
+    vec2(-0.020245273, 0.0012745932)                            // theta_high
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -96,20 +96,20 @@ const Conductor lf_aluminium = Conductor(
 
 const Curve lf_oxide_again = Curve(
     vec3(0.051936075, 0.18103975, 0.47650993),       // c0: coefficients of the powers of the curves' argument
-    vec3(0.0041462304, 0.003268253, -0.02949474),    // c1: 
-    vec3(0.0013731495, 0.0042241663, 0.007571563),   // c2: 
-    vec3(0.004693739, 0.02330193, 0.069636405),      // c3: 
-    vec3(-0.0020682998, -0.018003404, -0.06537761),  // c4: 
-    vec3(-0.004909046, -0.030430287, -0.09896755)    // c5: 
+    vec3(0.0041462304, 0.003268253, -0.02949474),    // c1
+    vec3(0.0013731495, 0.0042241663, 0.007571563),   // c2
+    vec3(0.004693739, 0.02330193, 0.069636405),      // c3
+    vec3(-0.0020682998, -0.018003404, -0.06537761),  // c4
+    vec3(-0.004909046, -0.030430287, -0.09896755)    // c5
 );
 
 const Curve lf_oxide_rest = Curve(
     vec3(0.1602691, 0.33893102, 0.69753754),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0019090921, -0.0055994317, -0.03013292),  // c1: 
-    vec3(0.0099090375, 0.008327574, 0.011986792),     // c2: 
-    vec3(0.022142217, 0.022772104, 0.03917426),       // c3: 
-    vec3(-0.021037765, -0.036795273, -0.07271987),    // c4: 
-    vec3(-0.029285982, -0.043275982, -0.08268833)     // c5: 
+    vec3(-0.0019090921, -0.0055994317, -0.03013292),  // c1
+    vec3(0.0099090375, 0.008327574, 0.011986792),     // c2
+    vec3(0.022142217, 0.022772104, 0.03917426),       // c3
+    vec3(-0.021037765, -0.036795273, -0.07271987),    // c4
+    vec3(-0.029285982, -0.043275982, -0.08268833)     // c5
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.

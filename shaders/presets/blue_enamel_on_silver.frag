@@ -20,13 +20,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Conductor {
@@ -37,11 +37,11 @@ struct Conductor {
 
 struct Curve {
     vec3 c0;  // coefficients of the powers of the curves' argument
-    vec3 c1;  // 
-    vec3 c2;  // 
-    vec3 c3;  // 
-    vec3 c4;  // 
-    vec3 c5;  // 
+    vec3 c1;
+    vec3 c2;
+    vec3 c3;
+    vec3 c4;
+    vec3 c5;
 };
 
 struct FreeDirection {
@@ -79,13 +79,13 @@ const Interface lf_glass_interface = Interface(
     vec4(-0.0095665855, 0.02155129, -0.023891417, 0.015120622),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.006776768, -0.010278594),                             // passed_high: the other two, of higher powers
     vec4(0.3525767, 0.004273914, -0.0012973398, 0.0005761385),   // bend: part by which the sine of light becomes smaller below
-    vec2(-0.006873429, 0.005520642),                             // bend_high: 
+    vec2(-0.006873429, 0.005520642),                             // bend_high
     vec4(0.6060782, -0.18197447, -0.103081346, -0.0463818),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.36219025, -0.32201004),                               // spread_high: 
+    vec2(0.36219025, -0.32201004),                               // spread_high
     vec4(1.0097462, -0.020453185, 0.014133871, -0.017468095),    // path: mean path over that of the refracted direction
-    vec2(0.03760022, -0.023602962),                              // path_high: 
+    vec2(0.03760022, -0.023602962),                              // path_high
     vec4(0.020642612, -0.03597436, 0.01141594, -0.083641335),    // theta: scale of the path's distribution
-    vec2(0.14392288, -0.04268641)                                // theta_high: 
+    vec2(0.14392288, -0.04268641)                                // theta_high
 );
 
 const Conductor lf_silver = Conductor(
@@ -96,20 +96,20 @@ const Conductor lf_silver = Conductor(
 
 const Curve lf_glass_again = Curve(
     vec3(0.061484847, 0.114084356, 0.3190873),         // c0: coefficients of the powers of the curves' argument
-    vec3(0.0004953742, -0.00017346069, -0.005575292),  // c1: 
-    vec3(0.0049787313, 0.010460891, 0.032365233),      // c2: 
-    vec3(0.010293804, 0.023224756, 0.079751074),       // c3: 
-    vec3(-0.0035225712, -0.010933287, -0.049268782),   // c4: 
-    vec3(-0.008758046, -0.022820711, -0.09099451)      // c5: 
+    vec3(0.0004953742, -0.00017346069, -0.005575292),  // c1
+    vec3(0.0049787313, 0.010460891, 0.032365233),      // c2
+    vec3(0.010293804, 0.023224756, 0.079751074),       // c3
+    vec3(-0.0035225712, -0.010933287, -0.049268782),   // c4
+    vec3(-0.008758046, -0.022820711, -0.09099451)      // c5
 );
 
 const Curve lf_glass_rest = Curve(
     vec3(0.22621354, 0.33426425, 0.7463006),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.011937071, -0.015942372, -0.033530384),  // c1: 
-    vec3(0.008633226, 0.00926511, 0.020775646),      // c2: 
-    vec3(0.04110229, 0.045128554, 0.07673329),       // c3: 
-    vec3(-0.02267015, -0.031795114, -0.08622992),    // c4: 
-    vec3(-0.04373336, -0.054082215, -0.121629715)    // c5: 
+    vec3(-0.011937071, -0.015942372, -0.033530384),  // c1
+    vec3(0.008633226, 0.00926511, 0.020775646),      // c2
+    vec3(0.04110229, 0.045128554, 0.07673329),       // c3
+    vec3(-0.02267015, -0.031795114, -0.08622992),    // c4
+    vec3(-0.04373336, -0.054082215, -0.121629715)    // c5
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.

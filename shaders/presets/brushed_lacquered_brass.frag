@@ -20,13 +20,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Conductor {
@@ -38,11 +38,11 @@ struct Conductor {
 
 struct Curve {
     vec3 c0;  // coefficients of the powers of the curves' argument
-    vec3 c1;  // 
-    vec3 c2;  // 
-    vec3 c3;  // 
-    vec3 c4;  // 
-    vec3 c5;  // 
+    vec3 c1;
+    vec3 c2;
+    vec3 c3;
+    vec3 c4;
+    vec3 c5;
 };
 
 struct Crossing {
@@ -73,13 +73,13 @@ const Interface lf_lacquer_interface = Interface(
     vec4(-0.02416102, 0.037756085, -0.01229288, -0.008737861),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.015993359, -0.009139275),                            // passed_high: the other two, of higher powers
     vec4(0.321479, 0.02150961, -0.017905116, 0.012897491),      // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0057248473, 0.00021928549),                         // bend_high: 
+    vec2(-0.0057248473, 0.00021928549),                         // bend_high
     vec4(0.6033607, -0.2861347, 0.23596437, -0.30813918),       // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.0014604777, 0.054320663),                            // spread_high: 
+    vec2(0.0014604777, 0.054320663),                            // spread_high
     vec4(1.0411197, -0.08653504, 0.08681801, -0.056460857),     // path: mean path over that of the refracted direction
-    vec2(-0.001490593, 0.017695904),                            // path_high: 
+    vec2(-0.001490593, 0.017695904),                            // path_high
     vec4(0.08841845, -0.19763331, 0.23841499, -0.2506254),      // theta: scale of the path's distribution
-    vec2(0.060514007, 0.080532625)                              // theta_high: 
+    vec2(0.060514007, 0.080532625)                              // theta_high
 );
 
 const Conductor lf_brass = Conductor(
@@ -91,20 +91,20 @@ const Conductor lf_brass = Conductor(
 
 const Curve lf_lacquer_again = Curve(
     vec3(0.42249948, 0.415963, 0.40688267),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.014192708, -0.013623945, -0.014244072),    // c1: 
-    vec3(0.0027496144, 0.0018178225, -0.00038444996),  // c2: 
-    vec3(-0.013452828, -0.015932798, -0.02210319),     // c3: 
-    vec3(-0.07764253, -0.07594529, -0.07448298),       // c4: 
-    vec3(-0.05783233, -0.054945737, -0.051086456)      // c5: 
+    vec3(-0.014192708, -0.013623945, -0.014244072),    // c1
+    vec3(0.0027496144, 0.0018178225, -0.00038444996),  // c2
+    vec3(-0.013452828, -0.015932798, -0.02210319),     // c3
+    vec3(-0.07764253, -0.07594529, -0.07448298),       // c4
+    vec3(-0.05783233, -0.054945737, -0.051086456)      // c5
 );
 
 const Curve lf_lacquer_rest = Curve(
     vec3(0.8324791, 0.71440005, 0.44934717),        // c0: coefficients of the powers of the curves' argument
-    vec3(-0.042789742, -0.036410406, -0.02534993),  // c1: 
-    vec3(0.02556324, 0.020827562, 0.011006579),     // c2: 
-    vec3(0.015206099, 0.007016659, -0.005005628),   // c3: 
-    vec3(-0.13221595, -0.11567798, -0.07749818),    // c4: 
-    vec3(-0.1276223, -0.107916296, -0.06761408)     // c5: 
+    vec3(-0.042789742, -0.036410406, -0.02534993),  // c1
+    vec3(0.02556324, 0.020827562, 0.011006579),     // c2
+    vec3(0.015206099, 0.007016659, -0.005005628),   // c3
+    vec3(-0.13221595, -0.11567798, -0.07749818),    // c4
+    vec3(-0.1276223, -0.107916296, -0.06761408)     // c5
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.

@@ -18,13 +18,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Lambert {
@@ -59,13 +59,13 @@ const Interface lf_clear_coat_interface = Interface(
     vec4(-0.00965715, 0.021873731, -0.0242624, 0.015375613),     // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0068878005, -0.010487776),                            // passed_high: the other two, of higher powers
     vec4(0.3311485, 0.004156165, -0.0012843013, 0.00058335066),  // bend: part by which the sine of light becomes smaller below
-    vec2(-0.00667572, 0.005346656),                              // bend_high: 
+    vec2(-0.00667572, 0.005346656),                              // bend_high
     vec4(0.5860988, -0.18256347, -0.10322496, -0.047041982),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.3522155, -0.3097973),                                 // spread_high: 
+    vec2(0.3522155, -0.3097973),                                 // spread_high
     vec4(1.0098422, -0.020885319, 0.0145971775, -0.017842293),   // path: mean path over that of the refracted direction
-    vec2(0.037828922, -0.023602962),                             // path_high: 
+    vec2(0.037828922, -0.023602962),                             // path_high
     vec4(0.019467048, -0.03448579, 0.0112755345, -0.07768409),   // theta: scale of the path's distribution
-    vec2(0.13575086, -0.04182259)                                // theta_high: 
+    vec2(0.13575086, -0.04182259)                                // theta_high
 );
 
 const Lambert lf_paint = Lambert(

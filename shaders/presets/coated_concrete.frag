@@ -19,13 +19,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct OrenNayar {
@@ -62,13 +62,13 @@ const Interface lf_sealer_interface = Interface(
     vec4(-0.030293863, 0.03411546, 0.007858283, -0.016438136),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0055495244, -0.0017564549),                          // passed_high: the other two, of higher powers
     vec4(0.30287337, 0.037373878, -0.027368307, 0.012910545),   // bend: part by which the sine of light becomes smaller below
-    vec2(0.0011300743, -0.004229963),                           // bend_high: 
+    vec2(0.0011300743, -0.004229963),                           // bend_high
     vec4(0.60811496, -0.33474666, 0.22261092, -0.17075449),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.089451894, 0.05588582),                             // spread_high: 
+    vec2(-0.089451894, 0.05588582),                             // spread_high
     vec4(1.0675288, -0.13411361, 0.10158929, -0.032689452),     // path: mean path over that of the refracted direction
-    vec2(-0.020755887, 0.020025134),                            // path_high: 
+    vec2(-0.020755887, 0.020025134),                            // path_high
     vec4(0.15087932, -0.33279446, 0.3304903, -0.2277554),       // theta: scale of the path's distribution
-    vec2(-0.014587497, 0.115838975)                             // theta_high: 
+    vec2(-0.014587497, 0.115838975)                             // theta_high
 );
 
 const OrenNayar lf_concrete = OrenNayar(

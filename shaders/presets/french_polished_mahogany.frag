@@ -19,13 +19,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct OrenNayar {
@@ -62,13 +62,13 @@ const Interface lf_shellac_interface = Interface(
     vec4(-0.009618692, 0.021733595, -0.024097253, 0.0152621865),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0068437173, -0.0104005365),                            // passed_high: the other two, of higher powers
     vec4(0.3398882, 0.0042054877, -0.0012893379, 0.0005802512),   // bend: part by which the sine of light becomes smaller below
-    vec2(-0.0067593604, 0.0054201186),                            // bend_high: 
+    vec2(-0.0067593604, 0.0054201186),                            // bend_high
     vec4(0.5943904, -0.18238035, -0.103228435, -0.04681036),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.35647148, -0.31495014),                                // spread_high: 
+    vec2(0.35647148, -0.31495014),                                // spread_high
     vec4(1.0098053, -0.02071166, 0.014411002, -0.017700434),      // path: mean path over that of the refracted direction
-    vec2(0.037746668, -0.023606777),                              // path_high: 
+    vec2(0.037746668, -0.023606777),                              // path_high
     vec4(0.019935852, -0.035078302, 0.011336705, -0.08009496),    // theta: scale of the path's distribution
-    vec2(0.13903353, -0.042160243)                                // theta_high: 
+    vec2(0.13903353, -0.042160243)                                // theta_high
 );
 
 const OrenNayar lf_mahogany = OrenNayar(

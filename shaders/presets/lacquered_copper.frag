@@ -20,13 +20,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Conductor {
@@ -37,11 +37,11 @@ struct Conductor {
 
 struct Curve {
     vec3 c0;  // coefficients of the powers of the curves' argument
-    vec3 c1;  // 
-    vec3 c2;  // 
-    vec3 c3;  // 
-    vec3 c4;  // 
-    vec3 c5;  // 
+    vec3 c1;
+    vec3 c2;
+    vec3 c3;
+    vec3 c4;
+    vec3 c5;
 };
 
 struct FreeDirection {
@@ -79,13 +79,13 @@ const Interface lf_lacquer_interface = Interface(
     vec4(-0.037516396, 0.012820616, 0.028922228, 0.005808585),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.008892238, -0.004150729),                           // passed_high: the other two, of higher powers
     vec4(0.2803238, 0.07559285, -0.024951816, -0.0072780848),   // bend: part by which the sine of light becomes smaller below
-    vec2(0.006108001, -0.0011891425),                           // bend_high: 
+    vec2(0.006108001, -0.0011891425),                           // bend_high
     vec4(0.6178303, -0.31337678, 0.045703977, 0.049666166),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.07097575, -0.031107336),                            // spread_high: 
+    vec2(-0.07097575, -0.031107336),                            // spread_high
     vec4(1.1324444, -0.21489698, 0.0686833, 0.039824724),       // path: mean path over that of the refracted direction
-    vec2(-0.021069527, -0.0014952421),                          // path_high: 
+    vec2(-0.021069527, -0.0014952421),                          // path_high
     vec4(0.3402057, -0.6483584, 0.3542442, -0.015058003),       // theta: scale of the path's distribution
-    vec2(-0.08199707, 0.081555456)                              // theta_high: 
+    vec2(-0.08199707, 0.081555456)                              // theta_high
 );
 
 const Conductor lf_copper = Conductor(
@@ -96,20 +96,20 @@ const Conductor lf_copper = Conductor(
 
 const Curve lf_lacquer_again = Curve(
     vec3(0.4570673, 0.3545673, 0.18230683),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.063961476, -0.03995382, -0.0130346045),  // c1: 
-    vec3(0.02226089, 0.015879743, 0.008814286),      // c2: 
-    vec3(0.04693213, 0.033248127, 0.021665916),      // c3: 
-    vec3(-0.12128408, -0.092753485, -0.04560323),    // c4: 
-    vec3(-0.11538455, -0.08750796, -0.046187207)     // c5: 
+    vec3(-0.063961476, -0.03995382, -0.0130346045),  // c1
+    vec3(0.02226089, 0.015879743, 0.008814286),      // c2
+    vec3(0.04693213, 0.033248127, 0.021665916),      // c3
+    vec3(-0.12128408, -0.092753485, -0.04560323),    // c4
+    vec3(-0.11538455, -0.08750796, -0.046187207)     // c5
 );
 
 const Curve lf_lacquer_rest = Curve(
     vec3(0.78204626, 0.4533313, 0.2610821),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.08314304, -0.046439126, -0.025496352),  // c1: 
-    vec3(0.020463213, 0.014473088, 0.018237017),    // c2: 
-    vec3(0.06437671, 0.03838128, 0.046581894),      // c3: 
-    vec3(-0.1468179, -0.095737144, -0.07114426),    // c4: 
-    vec3(-0.15313518, -0.09766099, -0.083030015)    // c5: 
+    vec3(-0.08314304, -0.046439126, -0.025496352),  // c1
+    vec3(0.020463213, 0.014473088, 0.018237017),    // c2
+    vec3(0.06437671, 0.03838128, 0.046581894),      // c3
+    vec3(-0.1468179, -0.095737144, -0.07114426),    // c4
+    vec3(-0.15313518, -0.09766099, -0.083030015)    // c5
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.

@@ -18,13 +18,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct OrenNayar {
@@ -60,13 +60,13 @@ const Interface lf_lacquer_interface = Interface(
     vec4(-0.051513065, 0.0059220353, 0.011182629, 0.04249962),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0011268947, -0.016593136),                           // passed_high: the other two, of higher powers
     vec4(0.22998923, 0.10045182, 0.013348281, -0.019759566),    // bend: part by which the sine of light becomes smaller below
-    vec2(-0.006403923, 0.0024611354),                           // bend_high: 
+    vec2(-0.006403923, 0.0024611354),                           // bend_high
     vec4(0.5412143, -0.1383994, -0.084431216, 0.013898551),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.009095132, -0.027009755),                           // spread_high: 
+    vec2(-0.009095132, -0.027009755),                           // spread_high
     vec4(1.2071077, -0.25323558, -0.014452308, 0.06881237),     // path: mean path over that of the refracted direction
-    vec2(0.010520339, -0.010583401),                            // path_high: 
+    vec2(0.010520339, -0.010583401),                            // path_high
     vec4(0.59302557, -0.9069695, 0.14514132, 0.23783478),       // theta: scale of the path's distribution
-    vec2(-0.018604606, -0.007173978)                            // theta_high: 
+    vec2(-0.018604606, -0.007173978)                            // theta_high
 );
 
 const OrenNayar lf_oak = OrenNayar(

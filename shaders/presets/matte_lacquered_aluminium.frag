@@ -20,13 +20,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Conductor {
@@ -37,11 +37,11 @@ struct Conductor {
 
 struct Curve {
     vec3 c0;  // coefficients of the powers of the curves' argument
-    vec3 c1;  // 
-    vec3 c2;  // 
-    vec3 c3;  // 
-    vec3 c4;  // 
-    vec3 c5;  // 
+    vec3 c1;
+    vec3 c2;
+    vec3 c3;
+    vec3 c4;
+    vec3 c5;
 };
 
 struct FreeDirection {
@@ -79,13 +79,13 @@ const Interface lf_lacquer_interface = Interface(
     vec4(-0.117580555, 0.06625485, -0.008904142, 0.026615268),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.019321598, -0.003716942),                            // passed_high: the other two, of higher powers
     vec4(0.16552648, 0.0812449, 0.04931599, 0.017954648),       // bend: part by which the sine of light becomes smaller below
-    vec2(-0.009957552, -0.010561466),                           // bend_high: 
+    vec2(-0.009957552, -0.010561466),                           // bend_high
     vec4(0.3831051, 0.013021208, -0.029791906, -0.035018355),   // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.029174253, -0.0132294595),                          // spread_high: 
+    vec2(-0.029174253, -0.0132294595),                          // spread_high
     vec4(1.2751803, -0.25845492, -0.06610456, 0.045912266),     // path: mean path over that of the refracted direction
-    vec2(0.022619247, -0.0008739233),                           // path_high: 
+    vec2(0.022619247, -0.0008739233),                           // path_high
     vec4(0.86954325, -1.0685096, -0.09935013, 0.33906257),      // theta: scale of the path's distribution
-    vec2(0.066010416, -0.044408634)                             // theta_high: 
+    vec2(0.066010416, -0.044408634)                             // theta_high
 );
 
 const Conductor lf_aluminium = Conductor(
@@ -96,20 +96,20 @@ const Conductor lf_aluminium = Conductor(
 
 const Curve lf_lacquer_again = Curve(
     vec3(0.59824705, 0.5957608, 0.5869738),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.05925618, -0.05873601, -0.054995082),   // c1: 
-    vec3(-0.06424565, -0.06397296, -0.06301321),    // c2: 
-    vec3(-0.030504882, -0.031114757, -0.03422764),  // c3: 
-    vec3(-0.11314553, -0.112362, -0.1103643),       // c4: 
-    vec3(-0.09669998, -0.09563735, -0.09200874)     // c5: 
+    vec3(-0.05925618, -0.05873601, -0.054995082),   // c1
+    vec3(-0.06424565, -0.06397296, -0.06301321),    // c2
+    vec3(-0.030504882, -0.031114757, -0.03422764),  // c3
+    vec3(-0.11314553, -0.112362, -0.1103643),       // c4
+    vec3(-0.09669998, -0.09563735, -0.09200874)     // c5
 );
 
 const Curve lf_lacquer_rest = Curve(
     vec3(0.7571853, 0.74703944, 0.7386069),            // c0: coefficients of the powers of the curves' argument
-    vec3(-0.06868862, -0.06793333, -0.06493265),       // c1: 
-    vec3(0.0015771538, 0.00059749186, -0.0011479706),  // c2: 
-    vec3(0.07875037, 0.07603115, 0.06974155),          // c3: 
-    vec3(-0.15356544, -0.15057847, -0.14713502),       // c4: 
-    vec3(-0.18380708, -0.17983341, -0.17371732)        // c5: 
+    vec3(-0.06868862, -0.06793333, -0.06493265),       // c1
+    vec3(0.0015771538, 0.00059749186, -0.0011479706),  // c2
+    vec3(0.07875037, 0.07603115, 0.06974155),          // c3
+    vec3(-0.15356544, -0.15057847, -0.14713502),       // c4
+    vec3(-0.18380708, -0.17983341, -0.17371732)        // c5
 );
 
 // Argument of the baked curves: 1 / (NoW + .2) from the first node of the tables to 1, as -1 to 1.

@@ -19,13 +19,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct OrenNayar {
@@ -62,13 +62,13 @@ const Interface lf_oil_interface = Interface(
     vec4(-0.102022186, 0.05346267, -0.00935491, 0.032929197),   // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.017657153, -0.007665964),                            // passed_high: the other two, of higher powers
     vec4(0.16971537, 0.0854998, 0.046793997, 0.0108908415),     // bend: part by which the sine of light becomes smaller below
-    vec2(-0.012092873, -0.00907886),                            // bend_high: 
+    vec2(-0.012092873, -0.00907886),                            // bend_high
     vec4(0.40050766, 0.0005070567, -0.04384765, -0.039853424),  // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.024704203, -0.009687424),                           // spread_high: 
+    vec2(-0.024704203, -0.009687424),                           // spread_high
     vec4(1.2611977, -0.25521743, -0.060661018, 0.047566414),    // path: mean path over that of the refracted direction
-    vec2(0.022820175, -0.0003055334),                           // path_high: 
+    vec2(0.022820175, -0.0003055334),                           // path_high
     vec4(0.8084004, -1.0369201, -0.056403957, 0.32752085),      // theta: scale of the path's distribution
-    vec2(0.052598123, -0.038988426)                             // theta_high: 
+    vec2(0.052598123, -0.038988426)                             // theta_high
 );
 
 const OrenNayar lf_walnut = OrenNayar(

@@ -18,13 +18,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Lambert {
@@ -59,13 +59,13 @@ const Interface lf_lacquer_interface = Interface(
     vec4(-0.009549635, 0.021495357, -0.023831615, 0.015080304),    // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.006754711, -0.0102405865),                              // passed_high: the other two, of higher powers
     vec4(0.35669813, 0.0042952225, -0.0013002157, 0.00057548285),  // bend: part by which the sine of light becomes smaller below
-    vec2(-0.006908551, 0.005551517),                               // bend_high: 
+    vec2(-0.006908551, 0.005551517),                               // bend_high
     vec4(0.60981756, -0.18181401, -0.103014365, -0.04622081),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.3639639, -0.32422444),                                  // spread_high: 
+    vec2(0.3639639, -0.32422444),                                  // spread_high
     vec4(1.009726, -0.020368248, 0.014042288, -0.017387986),       // path: mean path over that of the refracted direction
-    vec2(0.03754747, -0.023600101),                                // path_high: 
+    vec2(0.03754747, -0.023600101),                                // path_high
     vec4(0.020879557, -0.03627545, 0.011439269, -0.084810555),     // theta: scale of the path's distribution
-    vec2(0.14554596, -0.042862482)                                 // theta_high: 
+    vec2(0.14554596, -0.042862482)                                 // theta_high
 );
 
 const Lambert lf_black = Lambert(

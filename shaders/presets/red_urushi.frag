@@ -19,13 +19,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Lambert {
@@ -61,13 +61,13 @@ const Interface lf_urushi_interface = Interface(
     vec4(-0.019861361, 0.03569795, -0.021563128, 0.00021134847),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.018127924, -0.0131169055),                             // passed_high: the other two, of higher powers
     vec4(0.33833733, 0.014788263, -0.011239186, 0.008833408),     // bend: part by which the sine of light becomes smaller below
-    vec2(-0.008969933, 0.0041354),                                // bend_high: 
+    vec2(-0.008969933, 0.0041354),                                // bend_high
     vec4(0.60856783, -0.24872911, 0.17404774, -0.3165228),        // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.12010063, -0.025424272),                               // spread_high: 
+    vec2(0.12010063, -0.025424272),                               // spread_high
     vec4(1.0290464, -0.06173104, 0.06664726, -0.05434048),        // path: mean path over that of the refracted direction
-    vec2(0.015009224, 0.0062069893),                              // path_high: 
+    vec2(0.015009224, 0.0062069893),                              // path_high
     vec4(0.06297798, -0.1371728, 0.16691335, -0.22109175),        // theta: scale of the path's distribution
-    vec2(0.1095863, 0.037178833)                                  // theta_high: 
+    vec2(0.1095863, 0.037178833)                                  // theta_high
 );
 
 const Lambert lf_cinnabar = Lambert(

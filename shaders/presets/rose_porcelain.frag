@@ -18,13 +18,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Lambert {
@@ -59,13 +59,13 @@ const Interface lf_glaze_interface = Interface(
     vec4(-0.0151992105, 0.03096597, -0.026210945, 0.008551259),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.015562363, -0.01404037),                              // passed_high: the other two, of higher powers
     vec4(0.32867226, 0.008710392, -0.0053312182, 0.0043553114),  // bend: part by which the sine of light becomes smaller below
-    vec2(-0.009279445, 0.0059728324),                            // bend_high: 
+    vec2(-0.009279445, 0.0059728324),                            // bend_high
     vec4(0.5896745, -0.21121684, 0.055745453, -0.22864234),      // spread: width of a lobe seen through it, over that of the facets
-    vec2(0.23646295, -0.14334577),                               // spread_high: 
+    vec2(0.23646295, -0.14334577),                               // spread_high
     vec4(1.018596, -0.04008779, 0.042867064, -0.041899323),      // path: mean path over that of the refracted direction
-    vec2(0.028283417, -0.0073643923),                            // path_high: 
+    vec2(0.028283417, -0.0073643923),                            // path_high
     vec4(0.03754024, -0.07790418, 0.08442601, -0.15448993),      // theta: scale of the path's distribution
-    vec2(0.13333824, -0.008031782)                               // theta_high: 
+    vec2(0.13333824, -0.008031782)                               // theta_high
 );
 
 const Lambert lf_paint = Lambert(

@@ -18,13 +18,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Lambert {
@@ -59,13 +59,13 @@ const Interface lf_surface_interface = Interface(
     vec4(-0.117580555, 0.06625485, -0.008904142, 0.026615268),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.019321598, -0.003716942),                            // passed_high: the other two, of higher powers
     vec4(0.16552648, 0.0812449, 0.04931599, 0.017954648),       // bend: part by which the sine of light becomes smaller below
-    vec2(-0.009957552, -0.010561466),                           // bend_high: 
+    vec2(-0.009957552, -0.010561466),                           // bend_high
     vec4(0.3831051, 0.013021208, -0.029791906, -0.035018355),   // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.029174253, -0.0132294595),                          // spread_high: 
+    vec2(-0.029174253, -0.0132294595),                          // spread_high
     vec4(1.2751803, -0.25845492, -0.06610456, 0.045912266),     // path: mean path over that of the refracted direction
-    vec2(0.022619247, -0.0008739233),                           // path_high: 
+    vec2(0.022619247, -0.0008739233),                           // path_high
     vec4(0.86954325, -1.0685096, -0.09935013, 0.33906257),      // theta: scale of the path's distribution
-    vec2(0.066010416, -0.044408634)                             // theta_high: 
+    vec2(0.066010416, -0.044408634)                             // theta_high
 );
 
 const Lambert lf_paint = Lambert(

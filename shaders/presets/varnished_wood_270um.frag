@@ -19,13 +19,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct OrenNayar {
@@ -62,13 +62,13 @@ const Interface lf_varnish_interface = Interface(
     vec4(-0.0321689, 0.029983805, 0.015549282, -0.015668225),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.0009908297, -1.5788479e-05),                        // passed_high: the other two, of higher powers
     vec4(0.3058502, 0.04618659, -0.030208841, 0.010709345),    // bend: part by which the sine of light becomes smaller below
-    vec2(0.003648311, -0.005016148),                           // bend_high: 
+    vec2(0.003648311, -0.005016148),                           // bend_high
     vec4(0.6228708, -0.35022393, 0.20098852, -0.10739961),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.10634582, 0.03927332),                             // spread_high: 
+    vec2(-0.10634582, 0.03927332),                             // spread_high
     vec4(1.0811925, -0.15474677, 0.10140231, -0.017850518),    // path: mean path over that of the refracted direction
-    vec2(-0.02525264, 0.017201781),                            // path_high: 
+    vec2(-0.02525264, 0.017201781),                            // path_high
     vec4(0.19103706, -0.40984368, 0.36370075, -0.20119762),    // theta: scale of the path's distribution
-    vec2(-0.042300656, 0.12330281)                             // theta_high: 
+    vec2(-0.042300656, 0.12330281)                             // theta_high
 );
 
 const OrenNayar lf_wood = OrenNayar(

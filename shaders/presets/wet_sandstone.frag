@@ -18,13 +18,13 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct OrenNayar {
@@ -60,13 +60,13 @@ const Interface lf_water_interface = Interface(
     vec4(-0.026004575, 0.04301408, -0.014314687, -0.010176732),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(0.016221277, -0.00915219),                              // passed_high: the other two, of higher powers
     vec4(0.23830128, 0.018469945, -0.0155542195, 0.01065287),    // bend: part by which the sine of light becomes smaller below
-    vec2(-0.004437864, 4.7057867e-05),                           // bend_high: 
+    vec2(-0.004437864, 4.7057867e-05),                           // bend_high
     vec4(0.50467765, -0.25638375, 0.1732992, -0.2513595),        // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.00021466613, 0.05390638),                            // spread_high: 
+    vec2(-0.00021466613, 0.05390638),                            // spread_high
     vec4(1.0402317, -0.08861905, 0.08753228, -0.053181887),      // path: mean path over that of the refracted direction
-    vec2(-0.004088104, 0.018918514),                             // path_high: 
+    vec2(-0.004088104, 0.018918514),                             // path_high
     vec4(0.06900233, -0.16027227, 0.19247234, -0.19428445),      // theta: scale of the path's distribution
-    vec2(0.05203541, 0.05342995)                                 // theta_high: 
+    vec2(0.05203541, 0.05342995)                                 // theta_high
 );
 
 const OrenNayar lf_stone = OrenNayar(

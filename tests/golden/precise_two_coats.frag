@@ -20,22 +20,22 @@ struct Interface {
     vec4 passed;       // energy that passes, beyond the closed form: four coefficients
     vec2 passed_high;  // the other two, of higher powers
     vec4 bend;         // part by which the sine of light becomes smaller below
-    vec2 bend_high;    // 
+    vec2 bend_high;
     vec4 spread;       // width of a lobe seen through it, over that of the facets
-    vec2 spread_high;  // 
+    vec2 spread_high;
     vec4 path;         // mean path over that of the refracted direction
-    vec2 path_high;    // 
+    vec2 path_high;
     vec4 theta;        // scale of the path's distribution
-    vec2 theta_high;   // 
+    vec2 theta_high;
 };
 
 struct Curve {
     vec3 c0;  // coefficients of the powers of the curves' argument
-    vec3 c1;  // 
-    vec3 c2;  // 
-    vec3 c3;  // 
-    vec3 c4;  // 
-    vec3 c5;  // 
+    vec3 c1;
+    vec3 c2;
+    vec3 c3;
+    vec3 c4;
+    vec3 c5;
 };
 
 struct Conductor {
@@ -85,13 +85,13 @@ const Interface lf_coat_top = Interface(
     vec4(-0.035054997, 0.020641431, 0.025624495, -0.0064411927),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0061165085, -0.00076546334),                          // passed_high: the other two, of higher powers
     vec4(0.29338372, 0.062286936, -0.030093238, 0.0016581714),    // bend: part by which the sine of light becomes smaller below
-    vec2(0.0064179003, -0.0036261976),                            // bend_high: 
+    vec2(0.0064179003, -0.0036261976),                            // bend_high
     vec4(0.62495965, -0.34329897, 0.11627789, 0.00025048852),     // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.09256491, -0.0074115098),                             // spread_high: 
+    vec2(-0.09256491, -0.0074115098),                             // spread_high
     vec4(1.1078705, -0.18972442, 0.08829877, 0.015281439),        // path: mean path over that of the refracted direction
-    vec2(-0.025942624, 0.006829977),                              // path_high: 
+    vec2(-0.025942624, 0.006829977),                              // path_high
     vec4(0.26631966, -0.53991795, 0.37586775, -0.10775492),       // theta: scale of the path's distribution
-    vec2(-0.07368938, 0.10674948)                                 // theta_high: 
+    vec2(-0.07368938, 0.10674948)                                 // theta_high
 );
 
 const Interface lf_coat_both = Interface(
@@ -100,40 +100,40 @@ const Interface lf_coat_both = Interface(
     vec4(-0.035054997, 0.020641431, 0.025624495, -0.0064411927),  // passed: energy that passes, beyond the closed form: four coefficients
     vec2(-0.0061165085, -0.00076546334),                          // passed_high: the other two, of higher powers
     vec4(0.39897925, 0.055370897, -0.026322454, 0.002631843),     // bend: part by which the sine of light becomes smaller below
-    vec2(0.0066494346, -0.0025504231),                            // bend_high: 
+    vec2(0.0066494346, -0.0025504231),                            // bend_high
     vec4(0.081670046, -0.026981693, 0.009266108, -0.0005811006),  // spread: width of a lobe seen through it, over that of the facets
-    vec2(-0.009128239, -0.0023098513),                            // spread_high: 
+    vec2(-0.009128239, -0.0023098513),                            // spread_high
     vec4(1.0558188, -0.07341197, 0.019338906, 0.016380668),       // path: mean path over that of the refracted direction
-    vec2(-0.011226952, -0.0017836094),                            // path_high: 
+    vec2(-0.011226952, -0.0017836094),                            // path_high
     vec4(0.08372111, -0.15378262, 0.07919104, 0.01891802),        // theta: scale of the path's distribution
-    vec2(-0.030415025, 0.018339284)                               // theta_high: 
+    vec2(-0.030415025, 0.018339284)                               // theta_high
 );
 
 const Curve lf_coat_passed = Curve(
     vec3(0.9887751, 0.9825274, 0.9750761),             // c0: coefficients of the powers of the curves' argument
-    vec3(-0.0047635734, 0.0019268095, 0.00810504),     // c1: 
-    vec3(-0.008041143, -0.007782489, -0.0048092604),   // c2: 
-    vec3(-0.0037423372, -0.0006400347, 0.0025594234),  // c3: 
-    vec3(0.008578777, 0.0072550774, 0.0053499937),     // c4: 
-    vec3(0.0090043545, 0.006368518, 0.003155589)       // c5: 
+    vec3(-0.0047635734, 0.0019268095, 0.00810504),     // c1
+    vec3(-0.008041143, -0.007782489, -0.0048092604),   // c2
+    vec3(-0.0037423372, -0.0006400347, 0.0025594234),  // c3
+    vec3(0.008578777, 0.0072550774, 0.0053499937),     // c4
+    vec3(0.0090043545, 0.006368518, 0.003155589)       // c5
 );
 
 const Curve lf_coat_inner_again = Curve(
     vec3(0.6817515, 0.48762587, 0.2448359),         // c0: coefficients of the powers of the curves' argument
-    vec3(-0.1764141, -0.09085945, -0.032956876),    // c1: 
-    vec3(0.008886799, 0.017605416, 0.0133918),      // c2: 
-    vec3(-0.029955447, 0.00023061037, 0.02364339),  // c3: 
-    vec3(-0.10627888, -0.09002204, -0.04921511),    // c4: 
-    vec3(-0.06557995, -0.07798052, -0.054473057)    // c5: 
+    vec3(-0.1764141, -0.09085945, -0.032956876),    // c1
+    vec3(0.008886799, 0.017605416, 0.0133918),      // c2
+    vec3(-0.029955447, 0.00023061037, 0.02364339),  // c3
+    vec3(-0.10627888, -0.09002204, -0.04921511),    // c4
+    vec3(-0.06557995, -0.07798052, -0.054473057)    // c5
 );
 
 const Curve lf_coat_inner_rest = Curve(
     vec3(0.09124752, 0.07455532, 0.049194407),          // c0: coefficients of the powers of the curves' argument
-    vec3(-0.01832604, -0.012940375, -0.0070063383),     // c1: 
-    vec3(-1.104176e-05, 0.0015241578, 0.0011310587),    // c2: 
-    vec3(-0.013046138, -0.0068887547, -0.0021453463),   // c3: 
-    vec3(-0.011748575, -0.012056671, -0.008981725),     // c4: 
-    vec3(-0.0020794198, -0.0062519647, -0.0061956234)   // c5: 
+    vec3(-0.01832604, -0.012940375, -0.0070063383),     // c1
+    vec3(-1.104176e-05, 0.0015241578, 0.0011310587),    // c2
+    vec3(-0.013046138, -0.0068887547, -0.0021453463),   // c3
+    vec3(-0.011748575, -0.012056671, -0.008981725),     // c4
+    vec3(-0.0020794198, -0.0062519647, -0.0061956234)   // c5
 );
 
 const Conductor lf_base = Conductor(
@@ -144,20 +144,20 @@ const Conductor lf_base = Conductor(
 
 const Curve lf_coat_again = Curve(
     vec3(0.33393097, 0.43529072, 0.29938802),      // c0: coefficients of the powers of the curves' argument
-    vec3(-0.02490455, -0.035086893, -0.03115135),  // c1: 
-    vec3(0.03148394, 0.028581262, 0.016576536),    // c2: 
-    vec3(0.05128321, 0.029458433, 0.015581578),    // c3: 
-    vec3(-0.07091133, -0.077640295, -0.05261801),  // c4: 
-    vec3(-0.07806319, -0.07196039, -0.048757136)   // c5: 
+    vec3(-0.02490455, -0.035086893, -0.03115135),  // c1
+    vec3(0.03148394, 0.028581262, 0.016576536),    // c2
+    vec3(0.05128321, 0.029458433, 0.015581578),    // c3
+    vec3(-0.07091133, -0.077640295, -0.05261801),  // c4
+    vec3(-0.07806319, -0.07196039, -0.048757136)   // c5
 );
 
 const Curve lf_coat_rest = Curve(
     vec3(0.4785465, 0.3720594, 0.23941284),           // c0: coefficients of the powers of the curves' argument
-    vec3(-0.010893583, -0.01597108, -0.02145093),     // c1: 
-    vec3(0.02564989, 0.007945567, 0.0048398003),      // c2: 
-    vec3(0.0055748224, -0.01969561, -0.00030621886),  // c3: 
-    vec3(-0.055334806, -0.028814808, -0.023669533),   // c4: 
-    vec3(-0.04161048, -0.0074115694, -0.018222988)    // c5: 
+    vec3(-0.010893583, -0.01597108, -0.02145093),     // c1
+    vec3(0.02564989, 0.007945567, 0.0048398003),      // c2
+    vec3(0.0055748224, -0.01969561, -0.00030621886),  // c3
+    vec3(-0.055334806, -0.028814808, -0.023669533),   // c4
+    vec3(-0.04161048, -0.0074115694, -0.018222988)    // c5
 );
 
 // The cosine between either direction and their half vector.

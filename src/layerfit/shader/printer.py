@@ -70,7 +70,8 @@ class Printer:
             return f"const {glsl_type(leaves[0][1])} {name} = {literal(leaves[0][1])};\n"
         struct = self.struct(value, [(key, glsl_type(leaf)) for key, leaf in leaves])
         rows = [
-            (literal(leaf), f"{key}: {comment}") for (key, leaf), (_, _, comment) in zip(leaves, struct.fields, strict=True)
+            (literal(leaf), f"{key}: {comment}" if comment else key)
+            for (key, leaf), (_, _, comment) in zip(leaves, struct.fields, strict=True)
         ]
         width = max(len(text) for text, _ in rows) + 1
         lines = [

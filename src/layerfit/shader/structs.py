@@ -87,4 +87,5 @@ def comment_lines(fn: Callable[..., Any]) -> str:
 def struct_text(struct: StructType) -> str:
     width = max(len(kind) + len(name) for name, kind, _ in struct.fields) + 2
     rows = [(f"{kind} {name};", comment) for name, kind, comment in struct.fields]
-    return f"struct {struct.name} {{\n" + "".join(f"    {text:<{width}}  // {note}\n" for text, note in rows) + "};\n"
+    lines = [f"    {text:<{width}}  // {note}\n" if note else f"    {text}\n" for text, note in rows]
+    return f"struct {struct.name} {{\n{''.join(lines)}}};\n"
