@@ -55,9 +55,9 @@ def advance(y, state, bounds, total):
     return SOLVER.step(fn, y, None, {"lower": bounds[0], "upper": bounds[1]}, state, frozenset())[:2]
 
 
-def minimise(start, lower=-np.inf, upper=np.inf, target=TARGET, residual=residual):
+def minimise(start, lower=-np.inf, upper=np.inf, target=TARGET, residual=residual, gain=None):
     y = jnp.asarray(start, float)
-    state = initial(y)
+    state = initial(y, gain=gain)
     path = []
     for _ in range(200):
         total = products(jacobian(state.y_eval, target, residual))
@@ -96,6 +96,15 @@ def test_the_minimum_is_that_of_scipy(start):
     assert state.done
     assert float(state.loss) == pytest.approx(wanted.cost, rel=1e-6)
     np.testing.assert_allclose(np.abs(u), np.abs(wanted.x), rtol=1e-3)
+
+
+def test_a_step_that_promises_too_little_is_not_taken():
+    start = [0.3, 1.0, 1.0, 1.0, 1.0]
+    (_, end, path), (_, search, some) = minimise(start), minimise(start, gain=0.1)
+    assert search.done
+    assert len(some) < len(path)
+    np.testing.assert_array_equal(some, path[: len(some)])  # the way is the same
+    assert float(end.loss) <= float(search.loss) <= 1.2 * float(end.loss)
 
 
 def test_bounds_always_hold_and_the_rest_is_fitted():

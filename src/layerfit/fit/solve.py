@@ -119,8 +119,8 @@ class NormalLevenbergMarquardt(optx.AbstractMinimiser):
     search: optx.AbstractSearch = optx.ClassicalTrustRegion()
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):
-        state = begun(at_rest(self, y.size), y, np.asarray(options.get("trust", 1.0), float))
-        return dataclasses.replace(state, gain=np.asarray(options.get("gain", self.gain), float))
+        trust, gain = options.get("trust", 1.0), options.get("gain", self.gain)
+        return begun(at_rest(self, y.size), y, np.asarray(trust, float), np.asarray(gain, float))
 
     def step(self, fn, y, args, options, state, tags):
         lower, upper = options["lower"], options["upper"]
@@ -224,9 +224,11 @@ def descend(
     return lax.while_loop(goes_on, step, at)[1:]
 
 
-def begun(rest: Any, y: Any, trust: Any) -> Any:
-    """The state before the first step from `y`, with this trust in it."""
-    return dataclasses.replace(rest, y_eval=y, step_size=trust, search=dataclasses.replace(rest.search, step_size=trust))
+def begun(rest: Any, y: Any, trust: Any, gain: Any) -> Any:
+    """The state before the first step from `y`, with this trust in it, and the part of the loss that each step has to promise."""
+    return dataclasses.replace(
+        rest, y_eval=y, step_size=trust, gain=gain, search=dataclasses.replace(rest.search, step_size=trust)
+    )
 
 
 @functools.cache

@@ -137,7 +137,7 @@ class _Fit:
             aim = lax.cond(weighs, lambda: self.weigh(shown), lambda: aim)
             return self.normal(shown, aim, count), (shown, aim, jnp.array(False))
 
-        at = (u, begun(self.rest, u, trust), self.bounds, most, (shown, aim, weighs))
+        at = (u, begun(self.rest, u, trust, self.rest.gain), self.bounds, most, (shown, aim, weighs))
         u, state, losses, (shown, aim, _) = descend(SOLVER, evaluate, *at)
         return (u, shown, aim), (state.loss, state.gram, state.done, jnp.sum(~jnp.isnan(losses), dtype=np.int32))
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,25 @@ class StructType:
 
     name: str
     fields: tuple[tuple[str, str, str], ...]
+
+    def declaration(self) -> str:
+        """What says what it is, a field a line with its unit and meaning."""
+        texts = [f"{kind} {name};" for name, kind, _ in self.fields]
+        notes = [comment for _, _, comment in self.fields]
+        return f"struct {self.name} {{\n{_commented(texts, notes)}}};\n"
+
+    def constant(self, name: str, values: Sequence[str]) -> str:
+        """A constant of it, a value a line with what its field says."""
+        texts = [*(f"{value}," for value in values[:-1]), f"{values[-1]} "]  # the last as wide as with a comma
+        notes = [f"{field}: {comment}" if comment else field for field, _, comment in self.fields]
+        return f"const {self.name} {name} = {self.name}(\n{_commented(texts, notes)});\n"
+
+
+def _commented(texts: Sequence[str], notes: Sequence[str]) -> str:
+    """Lines of code, with the comments that they have one below the other."""
+    width = max(map(len, texts))
+    rows = zip(texts, notes, strict=True)
+    return "".join(f"    {text:<{width}}  // {note}\n" if note else f"    {text}\n" for text, note in rows)
 
 
 def base_type(kind: str) -> str:

@@ -18,7 +18,7 @@ from .bounds import ANY, Bounds, Calls, call, exactly, known, read, resolved, se
 from .glsl import ATOM, PREFIX, UNARY, PrintError, StructType, Value, glsl_type, indent, lift, literal, reads, safe
 from .names import name_of, source_of
 from .primitives import BUILTINS, GUARDS, PRIMITIVES
-from .structs import comment_lines, comments_of, grouped, leaves_of, result_paths, struct_of, struct_text, struct_value
+from .structs import comment_lines, comments_of, grouped, leaves_of, result_paths, struct_of, struct_value
 
 Parameter = tuple[str, str, StructType | None]
 """Of a chunk: its name, its type, and the struct that it is."""
@@ -38,7 +38,7 @@ class Printer:
 
     def structs_text(self) -> str:
         """Declarations of the structs."""
-        return "\n".join(struct_text(s) for s in self.structs.values())
+        return "\n".join(s.declaration() for s in self.structs.values())
 
     def functions_text(self) -> str:
         """Tables, helpers and functions, each before its first use."""
@@ -69,15 +69,7 @@ class Printer:
         if not dataclasses.is_dataclass(value):
             return f"const {glsl_type(leaves[0][1])} {name} = {literal(leaves[0][1])};\n"
         struct = self.struct(value, [(key, glsl_type(leaf)) for key, leaf in leaves])
-        rows = [
-            (literal(leaf), f"{key}: {comment}" if comment else key)
-            for (key, leaf), (_, _, comment) in zip(leaves, struct.fields, strict=True)
-        ]
-        width = max(len(text) for text, _ in rows) + 1
-        lines = [
-            f"    {text + (',' if k < len(rows) - 1 else ''):<{width}}  // {note}\n" for k, (text, note) in enumerate(rows)
-        ]
-        return f"const {struct.name} {name} = {struct.name}(\n{''.join(lines)});\n"
+        return struct.constant(name, [literal(leaf) for _, leaf in leaves])
 
     def uniform(self, name: str, value: Any) -> str:
         """Declare a struct or a number as a uniform."""

@@ -82,10 +82,3 @@ def comment_of(field: dataclasses.Field[Any]) -> str:
 def comment_lines(fn: Callable[..., Any]) -> str:
     first = (inspect.getdoc(fn) or "").split("\n\n")[0]
     return "".join(f"// {line}\n" for line in first.splitlines())
-
-
-def struct_text(struct: StructType) -> str:
-    width = max(len(kind) + len(name) for name, kind, _ in struct.fields) + 2
-    rows = [(f"{kind} {name};", comment) for name, kind, comment in struct.fields]
-    lines = [f"    {text:<{width}}  // {note}\n" if note else f"    {text}\n" for text, note in rows]
-    return f"struct {struct.name} {{\n{''.join(lines)}}};\n"
